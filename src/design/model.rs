@@ -1,0 +1,375 @@
+//! The resolved design: what every later stage reads.
+//!
+//! Lengths are millimetres and angles radians. Every number that can vary is a [`Dimension`] in one table, sampled once
+//! per draw and used wherever its name stands, so faces that are flush on the drawing stay flush in every instance.
+//! Nothing here refers to the syntax tree but for spans.
+
+use crate::diag::Span;
+use crate::units::{Quantity, Range};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use serde::Serialize;
+
+/// Index into [`Design::dims`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+pub struct DimId(pub u32);
+
+/// Which way material goes when a dimension grows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Sense {
+    /// A shaft-like size: the largest value has most material.
+    External,
+    /// A hole-like size: the smallest value has most material.
+    Internal,
+    /// A position, an angle, a pattern radius, a size used both ways: MMC and LMC are its nominal value
+    /// unless the spec states them.
+    Neutral,
+}
+
+/// One number of the drawing with its limits.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Dimension {
+    /// The path that names it to the user: `gear.bore.d`, `alignment_pin[2].z`, `pin_size`.
+    pub name: String,
+    pub quantity: Quantity,
+    pub range: Range,
+    pub sense: Sense,
+    /// Maximum and least material conditions.
+    pub mmc: f64,
+    pub lmc: f64,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// Arithmetic over dimensions.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum Expr {
+    Const(f64),
+    Dim(DimId),
+    Neg(Box<Expr>),
+    Add(Box<Expr>, Box<Expr>),
+    Sub(Box<Expr>, Box<Expr>),
+    Mul(Box<Expr>, Box<Expr>),
+    Div(Box<Expr>, Box<Expr>),
+}
+
+/// One value per dimension, indexed by [`DimId`]: nominal, MMC, LMC or a random draw (see `variation`).
+pub type Values = [f64];
+
+impl Expr {
+    pub fn eval(&self, values: &Values) -> f64 {
+        match self {
+            Expr::Const(v) => *v,
+            Expr::Dim(id) => values[id.0 as usize],
+            Expr::Neg(a) => -a.eval(values),
+            Expr::Add(a, b) => a.eval(values) + b.eval(values),
+            Expr::Sub(a, b) => a.eval(values) - b.eval(values),
+            Expr::Mul(a, b) => a.eval(values) * b.eval(values),
+            Expr::Div(a, b) => a.eval(values) / b.eval(values),
+        }
+    }
+
+    /// Every dimension the expression reads.
+    pub fn dims(&self, out: &mut Vec<DimId>) {
+        match self {
+            Expr::Const(_) => {}
+            Expr::Dim(id) => out.push(*id),
+            Expr::Neg(a) => a.dims(out),
+            Expr::Add(a, b) | Expr::Sub(a, b) | Expr::Mul(a, b) | Expr::Div(a, b) => {
+                a.dims(out);
+                b.dims(out);
+            }
+        }
+    }
+}
+
+/// A rigid transform `T · Rz · Ry · Rx`: translation in mm, rotations in rad.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PoseExpr {
+    pub t: [Expr; 3],
+    pub r: [Expr; 3],
+}
+
+impl PoseExpr {
+    pub fn identity() -> Self {
+        let zero = || [Expr::Const(0.0), Expr::Const(0.0), Expr::Const(0.0)];
+        PoseExpr { t: zero(), r: zero() }
+    }
+
+    pub fn eval(&self, values: &Values) -> Isometry3<f64> {
+        let [x, y, z] = [0, 1, 2].map(|i| self.t[i].eval(values));
+        let [a, b, c] = [0, 1, 2].map(|i| self.r[i].eval(values));
+        let turn = |axis, angle| UnitQuaternion::from_axis_angle(&axis, angle);
+        let rotation = turn(Vector3::z_axis(), c) * turn(Vector3::y_axis(), b) * turn(Vector3::x_axis(), a);
+        Isometry3::from_parts(Translation3::new(x, y, z), rotation)
+    }
+}
+
+/// How far a feature reaches along its own z.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum Extent {
+    Length(Expr),
+    /// Beyond the part at both ends, whatever its draw (cuts only).
+    Through,
+}
+
+/// A primitive in its own frame. Boxes, cylinders and cones stand on z = 0; a box is centred in x and y; a sphere is
+/// centred on the origin.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum Shape {
+    Box {
+        x: Expr,
+        y: Expr,
+        z: Extent,
+    },
+    /// Diameter and height.
+    Cylinder {
+        d: Expr,
+        h: Extent,
+    },
+    /// A frustum: diameter at z = 0, diameter at z = h (0 makes a point), height.
+    Cone {
+        d1: Expr,
+        d2: Expr,
+        h: Extent,
+    },
+    Sphere {
+        d: Expr,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Op {
+    Add,
+    Cut,
+    /// Keep only what lies inside.
+    Keep,
+}
+
+/// One line of a part: one or several copies of a primitive, added to, cut from or intersected with what stands above.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Feature {
+    pub name: String,
+    pub op: Op,
+    /// Written as a pattern (`3x`): its copies are named `bore[1]`, `bore[2]` …, otherwise plain `bore`.
+    pub patterned: bool,
+    pub copies: Vec<FeatureCopy>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FeatureCopy {
+    pub shape: Shape,
+    /// In the part's frame.
+    pub pose: PoseExpr,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Part {
+    pub name: String,
+    /// Index into [`Design::materials`].
+    pub material: usize,
+    pub features: Vec<Feature>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// A placed part. Parents come before their children in [`Design::components`]; component 0 is the root.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Component {
+    /// `gear`, `alignment_pin[2]`.
+    pub name: String,
+    /// Index into [`Design::parts`].
+    pub part: usize,
+    /// The component in whose frame it is placed; `None` for the root.
+    pub parent: Option<usize>,
+    /// Frame of the parent's feature it is placed on (`on gear.pin_hole[2]`), in the parent's frame.
+    pub frame: PoseExpr,
+    /// Placement in that frame, with its tolerance zone.
+    pub pose: PoseExpr,
+    /// Axes (x, y, z, rx, ry, rz) the spec calls `free`. A free turn is drawn over a whole turn.
+    pub free: [bool; 6],
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum MaterialKind {
+    /// GGX conductor.
+    Metal,
+    /// Diffuse body under a dielectric coat.
+    Plastic,
+    /// Lambertian: wood, black oxide, anodised or painted matt surfaces, fixtures.
+    Matt,
+}
+
+/// How a surface answers light. Ranges are drawn once per component and image: parts differ from one another.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Material {
+    pub name: String,
+    pub kind: MaterialKind,
+    /// Complex refractive index (metals), as seen by a monochrome camera under white light.
+    pub n: f64,
+    pub k: f64,
+    /// Share of light returned: scales the Fresnel term of a metal; albedo of the body of plastics and matt surfaces.
+    pub reflectance: Range,
+    /// GGX alpha (metals, coat of plastics).
+    pub roughness: Range,
+    /// Relative amplitude of the blotches on the surface (dirt, oxide, grain), 0 for none.
+    pub mottle: f64,
+    /// Size of the blotches in mm along x, y and z of the part's frame (unequal: grain).
+    pub mottle_size: [f64; 3],
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// A camera as installed, or as the compiler may choose it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CameraSpec {
+    /// Image width and height in px.
+    pub image: [u32; 2],
+    /// Focal length in mm; its range is the installation's uncertainty.
+    pub focal: Range,
+    /// Pixel pitch in mm.
+    pub pitch: f64,
+    /// Point looked at, in the assembly's frame (mm).
+    pub aim: [f64; 3],
+    pub placing: CameraPlacing,
+    /// Radial distortion, radius normalised by half the image width.
+    pub k1: Range,
+    /// Installation error: ± mm on each axis of the position, ± rad about each axis.
+    pub install_mm: f64,
+    pub install_rad: f64,
+    /// Standard deviation of the point spread in px.
+    pub blur: Range,
+    pub response: Response,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum CameraPlacing {
+    /// Distance from the aim in mm; elevation above the horizon and azimuth (where the camera stands, from +x
+    /// towards +y) in rad. +x of the world is to the right when it stands at -y (azimuth -90 degrees).
+    Fixed { distance: f64, elevation: f64, azimuth: f64 },
+    /// Ranges among which the compiler chooses.
+    Auto { distance: Range, elevation: Range, azimuth: Range },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Response {
+    Linear,
+    Srgb,
+}
+
+/// A lamp, or the light of the room.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LightSpec {
+    pub name: String,
+    pub shape: LightShape,
+    /// Radiance relative to the other lights; a prior, calibration replaces it.
+    pub power: f64,
+    /// How far the lamp drifts between photos: ± this share.
+    pub drift: f64,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum LightShape {
+    /// Round the lens: inner and outer radius, and how far behind the front of the lens (mm). The front of the lens is
+    /// the camera's position.
+    Ring { inner: f64, outer: f64, setback: f64 },
+    /// A flat panel or bar: size in mm across (horizontal) and upright, its centre and the point it is aimed at.
+    Panel { width: f64, height: f64, at: [f64; 3], aim: [f64; 3] },
+    /// The room: light from the whole upper hemisphere, in this many patches of equal solid angle (1: uniform).
+    Room { patches: u32 },
+}
+
+/// The surface the assembly stands on: an endless plane z = `z` of the assembly's frame (mm).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Floor {
+    pub z: f64,
+    pub material: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Station {
+    pub name: String,
+    pub camera: CameraSpec,
+    pub lights: Vec<LightSpec>,
+    pub floor: Option<Floor>,
+    /// Where the assembly may stand: x, y, z in mm and turn about z in rad.
+    pub x: Range,
+    pub y: Range,
+    pub z: Range,
+    pub rz: Range,
+    /// Exposure relative to nominal.
+    pub exposure: Range,
+    /// Standard deviation of the sensor's noise, share of full scale.
+    pub noise: f64,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// What the inspector answers for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Inspect {
+    /// Watched components (indices), in the order of [`Design::components`].
+    pub watch: Vec<Watch>,
+    /// Share of good assemblies that may be rejected.
+    pub false_reject: f64,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Watch {
+    pub component: usize,
+    /// Levels of the error tree in use; `None` lets visibility decide.
+    pub depth: Option<u32>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Train {
+    /// Draws of the assembly per scene.
+    pub images: u32,
+    pub seed: u64,
+    /// Resolution levels per node.
+    pub levels: u32,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Draw dimensions uniformly between the limits, or with the mode at nominal.
+    pub uniform: bool,
+}
+
+/// The whole spec, resolved.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Design {
+    /// Name of the assembly.
+    pub name: String,
+    pub dims: Vec<Dimension>,
+    pub materials: Vec<Material>,
+    pub parts: Vec<Part>,
+    pub components: Vec<Component>,
+    pub stations: Vec<Station>,
+    pub inspect: Inspect,
+    pub train: Train,
+}
+
+impl Design {
+    /// Every dimension at its nominal value.
+    pub fn nominal(&self) -> Vec<f64> {
+        self.dims.iter().map(|d| d.range.nominal).collect()
+    }
+
+    /// Every dimension at maximum material.
+    pub fn mmc(&self) -> Vec<f64> {
+        self.dims.iter().map(|d| d.mmc).collect()
+    }
+
+    /// Every dimension at least material.
+    pub fn lmc(&self) -> Vec<f64> {
+        self.dims.iter().map(|d| d.lmc).collect()
+    }
+}

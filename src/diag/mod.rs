@@ -1,0 +1,91 @@
+//! Diagnostics: what is wrong with a spec, as data.
+//!
+//! A stage returns what it could make and a list of these. Nothing here prints; `cli` renders them.
+
+use serde::Serialize;
+
+/// A stretch of bytes in one source file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize)]
+pub struct Span {
+    /// Which file: an index into [`Sources`]; 0 is the spec itself.
+    pub file: u32,
+    pub start: u32,
+    pub end: u32,
+}
+
+/// The texts that the spans point into, in the order they were read.
+#[derive(Debug, Clone, Default)]
+pub struct Sources {
+    /// (name as the user gave it, text).
+    pub files: Vec<(String, String)>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Severity {
+    Error,
+    Warning,
+}
+
+/// A place that takes part in a diagnostic, with what is to be said about it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Label {
+    pub span: Span,
+    pub text: String,
+    pub primary: bool,
+}
+
+/// One fault or doubt, in the user's names and numbers.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Diagnostic {
+    /// `E0305`, `W0502`: the key of its page in `gonogo explain`.
+    pub code: &'static str,
+    pub severity: Severity,
+    pub message: String,
+    pub labels: Vec<Label>,
+    /// Text that mends the fault when pasted where the primary label points.
+    pub help: Option<String>,
+    pub notes: Vec<String>,
+}
+
+impl Diagnostic {
+    /// An error at `span`.
+    pub fn error(code: &'static str, span: Span, message: impl Into<String>) -> Self {
+        Self::new(code, Severity::Error, span, message.into())
+    }
+
+    /// A warning at `span`.
+    pub fn warning(code: &'static str, span: Span, message: impl Into<String>) -> Self {
+        Self::new(code, Severity::Warning, span, message.into())
+    }
+
+    fn new(code: &'static str, severity: Severity, span: Span, message: String) -> Self {
+        let labels = vec![Label { span, text: String::new(), primary: true }];
+        Diagnostic { code, severity, message, labels, help: None, notes: Vec::new() }
+    }
+
+    /// What the primary label says beside the source.
+    pub fn label(mut self, text: impl Into<String>) -> Self {
+        self.labels[0].text = text.into();
+        self
+    }
+
+    /// A second place that matters.
+    pub fn also(mut self, span: Span, text: impl Into<String>) -> Self {
+        self.labels.push(Label { span, text: text.into(), primary: false });
+        self
+    }
+
+    pub fn help(mut self, text: impl Into<String>) -> Self {
+        self.help = Some(text.into());
+        self
+    }
+
+    pub fn note(mut self, text: impl Into<String>) -> Self {
+        self.notes.push(text.into());
+        self
+    }
+
+    pub fn is_error(&self) -> bool {
+        self.severity == Severity::Error
+    }
+}

@@ -1,0 +1,119 @@
+//! The camera: a pinhole with radial distortion, the same struct for rendering, training and judging.
+//!
+//! World frame in mm, image frame in px with the origin at the outer corner of the top left pixel, so the centre of
+//! that pixel is (0.5, 0.5). Camera frame: x right, y down, z along the view.
+
+use serde::{Deserialize, Serialize};
+
+/// A point or vector in mm.
+pub type Vec3 = [f64; 3];
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Centre of projection in the world (mm).
+    pub position: Vec3,
+    /// Rows: the camera's x (right), y (down) and z (forward) axes in the world.
+    pub axes: [Vec3; 3],
+    /// Focal length in px (focal length in mm over pixel pitch).
+    pub focal: f64,
+    /// Radial distortion: an undistorted point at r is seen at r (1 + k1 r²), r in units of half the image width.
+    pub k1: f64,
+    /// Image width and height in px.
+    pub size: [u32; 2],
+}
+
+impl Camera {
+    /// A camera at `position` looking at `aim`, the world's z up in the image.
+    pub fn look_at(position: Vec3, aim: Vec3, focal: f64, size: [u32; 2]) -> Camera {
+        let forward = normalise(sub(aim, position));
+        let up = if forward[2].abs() > 0.999_999 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
+        let right = normalise(cross(forward, up));
+        let down = cross(forward, right);
+        Camera { position, axes: [right, down, forward], focal, k1: 0.0, size }
+    }
+
+    /// Pixel where a world point is seen; `None` behind the camera.
+    pub fn project(&self, p: Vec3) -> Option<[f64; 2]> {
+        let d = sub(p, self.position);
+        let z = dot(self.axes[2], d);
+        if z <= 1e-6 {
+            return None;
+        }
+        let scale = self.focal / z;
+        let [u, v] = [dot(self.axes[0], d) * scale, dot(self.axes[1], d) * scale];
+        let half = f64::from(self.size[0]) / 2.0;
+        let stretch = 1.0 + self.k1 * (u * u + v * v) / (half * half);
+        Some([u * stretch + half, v * stretch + f64::from(self.size[1]) / 2.0])
+    }
+
+    /// Unit direction in the world of the ray through a pixel.
+    pub fn ray(&self, pixel: [f64; 2]) -> Vec3 {
+        let half = f64::from(self.size[0]) / 2.0;
+        let seen = [pixel[0] - half, pixel[1] - f64::from(self.size[1]) / 2.0];
+        let mut undistorted = seen;
+        // Fixed point of r (1 + k1 r²) = seen: contracts by a factor of about 2 k1 r² per round.
+        for _ in 0..20 {
+            let r2 = (undistorted[0].powi(2) + undistorted[1].powi(2)) / (half * half);
+            let stretch = 1.0 + self.k1 * r2;
+            undistorted = [seen[0] / stretch, seen[1] / stretch];
+        }
+        let [u, v] = [undistorted[0] / self.focal, undistorted[1] / self.focal];
+        let [right, down, forward] = self.axes;
+        normalise([0, 1, 2].map(|i| right[i] * u + down[i] * v + forward[i]))
+    }
+
+    /// Where the ray through a pixel meets the plane z = `z`; `None` if it never does.
+    pub fn on_plane(&self, pixel: [f64; 2], z: f64) -> Option<Vec3> {
+        let d = self.ray(pixel);
+        let t = (z - self.position[2]) / d[2];
+        (t.is_finite() && t > 0.0).then(|| [0, 1, 2].map(|i| self.position[i] + d[i] * t))
+    }
+
+    /// The camera of the same view with `factor` times fewer pixels each way.
+    pub fn reduced(&self, factor: u32) -> Camera {
+        Camera { focal: self.focal / f64::from(factor), size: self.size.map(|s| s / factor), ..*self }
+    }
+}
+
+pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub fn normalise(a: Vec3) -> Vec3 {
+    let n = dot(a, a).sqrt();
+    a.map(|v| v / n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ray_inverts_project_with_distortion() {
+        let mut camera = Camera::look_at([0.0, -155.0, 303.0], [0.0, 0.0, 12.0], 2162.0, [640, 480]);
+        camera.k1 = -0.05;
+        for p in [[0.0, 0.0, 12.0], [30.0, -20.0, 3.0], [-40.0, 25.0, -4.0]] {
+            let pixel = camera.project(p).unwrap();
+            let back = camera.on_plane(pixel, p[2]).unwrap();
+            assert!(sub(back, p).iter().all(|e| e.abs() < 1e-6), "{p:?} {back:?}");
+        }
+    }
+
+    #[test]
+    fn x_is_right_and_z_is_up_in_the_image() {
+        let camera = Camera::look_at([0.0, -155.0, 303.0], [0.0, 0.0, 12.0], 2162.0, [640, 480]);
+        let centre = camera.project([0.0, 0.0, 12.0]).unwrap();
+        assert!((centre[0] - 320.0).abs() < 1e-9 && (centre[1] - 240.0).abs() < 1e-9);
+        assert!(camera.project([1.0, 0.0, 12.0]).unwrap()[0] > centre[0]);
+        assert!(camera.project([0.0, 0.0, 13.0]).unwrap()[1] < centre[1]);
+    }
+}

@@ -1,0 +1,112 @@
+//! Stage 3: a part and a draw of its dimensions become a solid: exact faces, edges and vertices, and watertight triangles.
+//!
+//! In: [`crate::design::model::Part`] and one value per dimension. Out: [`Solid`] in the part's frame, or diagnostics that
+//! name the features. Never a wrong solid: what fails the checks is an error.
+
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+
+/// A surface without a sense: which side is material belongs to the face. All in the part's frame, mm and rad.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Surface {
+    /// Points p with `normal · p = offset`.
+    Plane {
+        normal: Unit<Vector3<f64>>,
+        offset: f64,
+    },
+    Cylinder {
+        point: Point3<f64>,
+        axis: Unit<Vector3<f64>>,
+        radius: f64,
+    },
+    /// The half of the double cone on the side of `axis`, seen from the apex.
+    Cone {
+        apex: Point3<f64>,
+        axis: Unit<Vector3<f64>>,
+        half_angle: f64,
+    },
+    Sphere {
+        centre: Point3<f64>,
+        radius: f64,
+    },
+}
+
+/// The curve an edge lies on.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Curve {
+    Line,
+    Circle {
+        centre: Point3<f64>,
+        axis: Unit<Vector3<f64>>,
+        radius: f64,
+    },
+    Ellipse {
+        centre: Point3<f64>,
+        major: Vector3<f64>,
+        minor: Vector3<f64>,
+    },
+    /// Any other intersection curve: its samples, exact to the kernel's tolerance.
+    Sampled,
+}
+
+/// Where two faces meet.
+#[derive(Debug, Clone)]
+pub struct Edge {
+    pub curve: Curve,
+    /// Indices into [`Solid::vertices`]; `None` twice for a closed curve without a corner.
+    pub ends: [Option<usize>; 2],
+    /// The two faces, indices into [`Solid::faces`] (the same twice for a seam).
+    pub faces: [usize; 2],
+    /// Samples from end to end, shared by both faces' triangles.
+    pub samples: Vec<Point3<f64>>,
+}
+
+#[derive(Debug, Clone)]
+pub struct Face {
+    /// Index into [`Solid::surfaces`].
+    pub surface: usize,
+    /// True when material lies on the side the surface's canonical normal points away from: that is, when the outward
+    /// normal of the solid equals the canonical normal (plane: `normal`; others: away from the axis or centre).
+    pub outward: bool,
+    /// Loops of (edge, runs forward), the outer one first where there is one.
+    pub loops: Vec<Vec<(usize, bool)>>,
+    pub area: f64,
+    /// Feature side the face comes from: `bore[2].side`, `slab.top`.
+    pub name: String,
+}
+
+/// A B-rep with its triangles.
+#[derive(Debug, Clone)]
+pub struct Solid {
+    pub surfaces: Vec<Surface>,
+    pub faces: Vec<Face>,
+    pub edges: Vec<Edge>,
+    pub vertices: Vec<Point3<f64>>,
+    /// Volume (mm³) and area (mm²) by the divergence theorem over the exact faces.
+    pub volume: f64,
+    pub area: f64,
+    pub mesh: TriMesh,
+}
+
+/// Watertight triangles, counter-clockwise seen from outside.
+#[derive(Debug, Clone, Default)]
+pub struct TriMesh {
+    pub positions: Vec<Point3<f64>>,
+    /// Vertex indices per triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// Outward analytic unit normals at the three corners of each triangle.
+    pub normals: Vec<[Vector3<f64>; 3]>,
+    /// Face of the solid each triangle belongs to.
+    pub faces: Vec<u32>,
+}
+
+impl TriMesh {
+    /// The mesh moved by a rigid motion.
+    pub fn moved(&self, pose: &Isometry3<f64>) -> TriMesh {
+        TriMesh {
+            positions: self.positions.iter().map(|p| pose * p).collect(),
+            triangles: self.triangles.clone(),
+            normals: self.normals.iter().map(|n| n.map(|v| pose.rotation * v)).collect(),
+            faces: self.faces.clone(),
+        }
+    }
+}
