@@ -17,6 +17,8 @@ pub struct Camera {
     pub axes: [Vec3; 3],
     /// Focal length in px (focal length in mm over pixel pitch).
     pub focal: f64,
+    /// Principal point in px.
+    pub centre: [f64; 2],
     /// Radial distortion: an undistorted point at r is seen at r (1 + k1 r²), r in units of half the image width.
     pub k1: f64,
     /// Image width and height in px.
@@ -30,7 +32,8 @@ impl Camera {
         let up = if forward[2].abs() > 0.999_999 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
         let right = normalise(cross(forward, up));
         let down = cross(forward, right);
-        Camera { position, axes: [right, down, forward], focal, k1: 0.0, size }
+        let centre = size.map(|s| f64::from(s) / 2.0);
+        Camera { position, axes: [right, down, forward], focal, centre, k1: 0.0, size }
     }
 
     /// Pixel where a world point is seen; `None` behind the camera.
@@ -42,15 +45,15 @@ impl Camera {
         }
         let scale = self.focal / z;
         let [u, v] = [dot(self.axes[0], d) * scale, dot(self.axes[1], d) * scale];
-        let half = f64::from(self.size[0]) / 2.0;
+        let half = self.centre[0];
         let stretch = 1.0 + self.k1 * (u * u + v * v) / (half * half);
-        Some([u * stretch + half, v * stretch + f64::from(self.size[1]) / 2.0])
+        Some([u * stretch + half, v * stretch + self.centre[1]])
     }
 
     /// Unit direction in the world of the ray through a pixel.
     pub fn ray(&self, pixel: [f64; 2]) -> Vec3 {
-        let half = f64::from(self.size[0]) / 2.0;
-        let seen = [pixel[0] - half, pixel[1] - f64::from(self.size[1]) / 2.0];
+        let half = self.centre[0];
+        let seen = [pixel[0] - half, pixel[1] - self.centre[1]];
         let mut undistorted = seen;
         // Fixed point of r (1 + k1 r²) = seen: contracts by a factor of about 2 k1 r² per round.
         for _ in 0..20 {
@@ -72,7 +75,9 @@ impl Camera {
 
     /// The camera of the same view with `factor` times fewer pixels each way.
     pub fn reduced(&self, factor: u32) -> Camera {
-        Camera { focal: self.focal / f64::from(factor), size: self.size.map(|s| s / factor), ..*self }
+        let by = f64::from(factor);
+        let (focal, centre) = (self.focal / by, self.centre.map(|c| c / by));
+        Camera { focal, centre, size: self.size.map(|s| s / factor), ..*self }
     }
 }
 

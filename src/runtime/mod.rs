@@ -3,3 +3,12 @@
 //! An island: it knows nothing of the compiler and builds alone with `--no-default-features`.
 
 pub mod camera;
+pub mod density;
+pub mod grid;
+mod haar;
+pub mod linear;
+pub mod locate;
+pub mod model;
+pub mod photo;
+pub mod pose;
+pub mod window;

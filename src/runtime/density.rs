@@ -1,0 +1,226 @@
+//! The density of a node's Haar coefficients under one hypothesis.
+//!
+//! z = mean + W a + e: `a` are a few nuisances with unit normal priors (reflectance, glint, lamp drift), `e` independent
+//! Student-t noise with its own scale per coefficient. W's first columns are the leading principal directions of the
+//! training draws in the metric of the noise (probabilistic principal components, Tipping and Bishop 1999), the rest are
+//! the lamps' own images scaled by their drift: images are linear in light. A diagonal Gaussian would average bright and
+//! dark parts into "no edge, large variance".
+
+use super::linear;
+use std::ops::Range;
+
+/// Learned directions per hypothesis.
+const DIRECTIONS: usize = 2;
+/// Weight of the level's median variance, in draws.
+const SHRINK_DRAWS: f64 = 6.0;
+/// Variance floor: share of the template's root mean square at the level, for what no renderer knows.
+const MODEL_ERROR: f64 = 0.12;
+/// Degrees of freedom of the noise.
+const STUDENT: f64 = 5.0;
+
+pub struct Density {
+    mean: Vec<f32>,
+    /// Columns of W.
+    columns: Vec<Vec<f32>>,
+    /// 1 / variance per coefficient.
+    precision: Vec<f32>,
+    /// Cholesky factor of I + WᵀΛW.
+    factor: Vec<f64>,
+    /// -(log det(I + WᵀΛW) - Σ log precision) / 2.
+    log_norm: f64,
+}
+
+/// What the densities of one node share.
+pub struct Floor {
+    pub levels: Vec<Range<usize>>,
+    /// Sensor noise in the node's px (standard deviation).
+    pub noise: f64,
+    /// Root mean square of the good template per level.
+    pub rms: Vec<f64>,
+}
+
+impl Floor {
+    pub fn new(levels: &[Range<usize>], noise: f64, good_mean: &[f32]) -> Floor {
+        let square = |r: &Range<usize>| good_mean[r.clone()].iter().map(|&v| f64::from(v).powi(2)).sum::<f64>();
+        let rms = levels.iter().map(|r| (square(r) / r.len().max(1) as f64).sqrt()).collect();
+        Floor { levels: levels.to_vec(), noise, rms }
+    }
+}
+
+/// The mean of samples of equal length.
+pub fn mean_of(samples: &[Vec<f32>]) -> Vec<f32> {
+    let mut mean = vec![0.0f64; samples[0].len()];
+    for sample in samples {
+        mean.iter_mut().zip(sample).for_each(|(m, &v)| *m += f64::from(v));
+    }
+    mean.into_iter().map(|m| (m / samples.len() as f64) as f32).collect()
+}
+
+impl Density {
+    /// From coefficient vectors of the draws (at least two) and, per lamp, the column of its drift.
+    pub fn fit(samples: &[Vec<f32>], lamps: Vec<Vec<f32>>, floor: &Floor) -> Density {
+        let mean = mean_of(samples);
+        let residuals: Vec<Vec<f32>> =
+            samples.iter().map(|s| s.iter().zip(&mean).map(|(a, b)| a - b).collect()).collect();
+        let total = variance(&residuals, samples.len() - 1, floor);
+        let (columns, rests) = principal(&residuals, &total);
+        let freedom = samples.len().saturating_sub(1 + columns.len()).max(1);
+        let variance = variance(&rests, freedom, floor);
+        let precision: Vec<f32> = variance.iter().map(|&v| 1.0 / v).collect();
+        Density::assemble(mean, columns.into_iter().chain(lamps).collect(), precision)
+    }
+
+    fn assemble(mean: Vec<f32>, columns: Vec<Vec<f32>>, precision: Vec<f32>) -> Density {
+        let n = columns.len();
+        let mut gram = vec![0.0; n * n];
+        for i in 0..n {
+            for j in 0..=i {
+                let dot = weighted_dot(&columns[i], &columns[j], &precision);
+                gram[i * n + j] = dot + f64::from(u8::from(i == j));
+                gram[j * n + i] = gram[i * n + j];
+            }
+        }
+        // I + WᵀΛW is positive definite; only non-finite coefficients could make it fail.
+        let factor = linear::cholesky(&gram, n).unwrap_or_else(|| identity(n));
+        let log_det: f64 = (0..n).map(|i| factor[i * n + i].ln() * 2.0).sum();
+        let log_precision: f64 = precision.iter().map(|&p| f64::from(p).ln()).sum();
+        Density { mean, columns, precision, factor, log_norm: (log_precision - log_det) / 2.0 }
+    }
+
+    pub fn mean(&self) -> &[f32] {
+        &self.mean
+    }
+
+    /// Log density under Gaussian noise, up to the constant all hypotheses share: fast, for the search over shifts.
+    pub fn gaussian(&self, z: &[f32]) -> f64 {
+        let (square, b) = self.project(z);
+        let a = linear::solve_with(&self.factor, &b);
+        let explained: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
+        self.log_norm - (square - explained) / 2.0
+    }
+
+    /// Log density under Student-t noise: nuisances at their robust maximum, integrated by Laplace's method.
+    pub fn student(&self, z: &[f32]) -> f64 {
+        const ROUNDS: usize = 2;
+        let (_, b) = self.project(z);
+        let mut a = linear::solve_with(&self.factor, &b);
+        for _ in 0..ROUNDS {
+            a = self.reweighted(z, &a);
+        }
+        let rest = self.residual(z, &a);
+        let noise: f64 = rest.iter().map(|&r| (1.0 + f64::from(r * r) / STUDENT).ln()).sum();
+        let prior: f64 = a.iter().map(|v| v * v).sum();
+        self.log_norm - (STUDENT + 1.0) / 2.0 * noise - prior / 2.0
+    }
+
+    /// Residual in standard deviations after taking the nuisances off.
+    fn residual(&self, z: &[f32], a: &[f64]) -> Vec<f32> {
+        let mut rest: Vec<f32> = z.iter().zip(&self.mean).map(|(z, m)| z - m).collect();
+        for (column, &weight) in self.columns.iter().zip(a) {
+            rest.iter_mut().zip(column).for_each(|(r, &w)| *r -= w * weight as f32);
+        }
+        rest.iter_mut().zip(&self.precision).for_each(|(r, &p)| *r *= p.sqrt());
+        rest
+    }
+
+    /// One round of iteratively reweighted least squares for the nuisances.
+    fn reweighted(&self, z: &[f32], a: &[f64]) -> Vec<f64> {
+        let nu = STUDENT as f32;
+        let weights: Vec<f32> =
+            self.residual(z, a).iter().zip(&self.precision).map(|(&r, &p)| p * (nu + 1.0) / (nu + r * r)).collect();
+        let n = self.columns.len();
+        let mut gram = identity(n);
+        for i in 0..n {
+            for j in 0..=i {
+                let dot = weighted_dot(&self.columns[i], &self.columns[j], &weights);
+                gram[i * n + j] += dot;
+                if i != j {
+                    gram[j * n + i] += dot;
+                }
+            }
+        }
+        let rest: Vec<f32> = z.iter().zip(&self.mean).map(|(z, m)| z - m).collect();
+        let b: Vec<f64> = self.columns.iter().map(|c| weighted_dot(c, &rest, &weights)).collect();
+        linear::solve_spd(&gram, &b).unwrap_or_else(|| a.to_vec())
+    }
+
+    /// (rᵀΛr, WᵀΛr) for r = z - mean.
+    fn project(&self, z: &[f32]) -> (f64, Vec<f64>) {
+        let mut square = 0.0f64;
+        let scaled: Vec<f32> = (0..z.len())
+            .map(|k| {
+                let r = z[k] - self.mean[k];
+                let s = r * self.precision[k];
+                square += f64::from(r * s);
+                s
+            })
+            .collect();
+        let dot = |c: &Vec<f32>| -> f64 { dot(c, &scaled) };
+        (square, self.columns.iter().map(dot).collect())
+    }
+}
+
+fn identity(n: usize) -> Vec<f64> {
+    (0..n * n).map(|i| f64::from(u8::from(i % (n + 1) == 0))).collect()
+}
+
+/// Dot product in chunks of f32, summed in f64: vectorises and stays accurate; the order is fixed.
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    a.chunks(64).zip(b.chunks(64)).map(|(a, b)| f64::from(a.iter().zip(b).map(|(x, y)| x * y).sum::<f32>())).sum()
+}
+
+fn weighted_dot(a: &[f32], b: &[f32], weights: &[f32]) -> f64 {
+    let chunk = |((a, b), w): ((&[f32], &[f32]), &[f32])| {
+        f64::from(a.iter().zip(b).zip(w).map(|((x, y), w)| x * y * w).sum::<f32>())
+    };
+    a.chunks(64).zip(b.chunks(64)).zip(weights.chunks(64)).map(chunk).sum()
+}
+
+/// Variance per coefficient: the draws', shrunk towards its level's median, not below the floor.
+fn variance(rests: &[Vec<f32>], freedom: usize, floor: &Floor) -> Vec<f32> {
+    let n = rests.len() as f64;
+    let mut out = vec![0.0f32; rests[0].len()];
+    for (k, v) in out.iter_mut().enumerate() {
+        let sum: f64 = rests.iter().map(|r| f64::from(r[k]).powi(2)).sum();
+        *v = (sum / freedom as f64) as f32;
+    }
+    for (level, range) in floor.levels.iter().enumerate() {
+        let typical = f64::from(linear::median(&mut out[range.clone()].to_vec()));
+        let sensor = floor.noise * floor.noise / 4f64.powi(level as i32 + 1);
+        let least = sensor + (MODEL_ERROR * floor.rms[level]).powi(2) + 1e-12;
+        for v in &mut out[range.clone()] {
+            let shrunk = (SHRINK_DRAWS * typical + n * f64::from(*v)) / (SHRINK_DRAWS + n);
+            *v = shrunk.max(least) as f32;
+        }
+    }
+    out
+}
+
+/// The leading directions of the residuals in the metric 1/variance, scaled to unit nuisances, and what they leave.
+fn principal(residuals: &[Vec<f32>], variance: &[f32]) -> (Vec<Vec<f32>>, Vec<Vec<f32>>) {
+    let n = residuals.len();
+    let precision: Vec<f32> = variance.iter().map(|v| 1.0 / v).collect();
+    let mut gram = vec![0.0; n * n];
+    for i in 0..n {
+        for j in 0..=i {
+            gram[i * n + j] = weighted_dot(&residuals[i], &residuals[j], &precision);
+            gram[j * n + i] = gram[i * n + j];
+        }
+    }
+    let (values, vectors) = linear::symmetric_eigen(&gram, n);
+    let count = DIRECTIONS.min(n.saturating_sub(2));
+    let mut rests = residuals.to_vec();
+    let mut columns = Vec::new();
+    for (_, vector) in values.iter().zip(&vectors).take(count).filter(|(value, _)| **value > 0.0) {
+        let mut direction = vec![0.0f32; variance.len()];
+        for (residual, &e) in residuals.iter().zip(vector) {
+            direction.iter_mut().zip(residual).for_each(|(d, &r)| *d += r * e as f32);
+        }
+        for (rest, &e) in rests.iter_mut().zip(vector) {
+            rest.iter_mut().zip(&direction).for_each(|(r, &d)| *r -= d * e as f32);
+        }
+        let unit = 1.0 / (n as f32).sqrt();
+        columns.push(direction.iter().map(|d| d * unit).collect());
+    }
+    (columns, rests)
+}

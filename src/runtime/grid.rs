@@ -1,0 +1,81 @@
+//! A grey image: rows of linear values, with the few operations that judging needs.
+
+/// Width times height values, row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    pub width: usize,
+    pub height: usize,
+    pub values: Vec<f32>,
+}
+
+impl Grid {
+    /// # Panics
+    /// When the number of values is not width times height.
+    pub fn new(width: usize, height: usize, values: Vec<f32>) -> Grid {
+        assert_eq!(values.len(), width * height, "a grid of {width} x {height}");
+        Grid { width, height, values }
+    }
+
+    pub fn filled(width: usize, height: usize, value: f32) -> Grid {
+        Grid { width, height, values: vec![value; width * height] }
+    }
+
+    pub fn at(&self, x: usize, y: usize) -> f32 {
+        self.values[y * self.width + x]
+    }
+
+    /// The mean of every `factor` by `factor` block; incomplete blocks at the right and bottom are dropped.
+    pub fn reduced(&self, factor: usize) -> Grid {
+        if factor == 1 {
+            return self.clone();
+        }
+        let (width, height) = (self.width / factor, self.height / factor);
+        let share = 1.0 / (factor * factor) as f32;
+        let mut values = vec![0.0f32; width * height];
+        for y in 0..height * factor {
+            let row = &self.values[y * self.width..];
+            let out = &mut values[y / factor * width..][..width];
+            for (x, v) in out.iter_mut().enumerate() {
+                *v += row[x * factor..][..factor].iter().sum::<f32>() * share;
+            }
+        }
+        Grid { width, height, values }
+    }
+
+    /// Bilinear value at a point in px (the centre of the first pixel is (0.5, 0.5)); `None` outside the pixel centres.
+    pub fn sample(&self, point: [f64; 2]) -> Option<f32> {
+        let (x, y) = (point[0] - 0.5, point[1] - 0.5);
+        let inside = x >= 0.0 && y >= 0.0 && x <= (self.width - 1) as f64 && y <= (self.height - 1) as f64;
+        if !inside {
+            return None;
+        }
+        let (i, j) = ((x as usize).min(self.width.saturating_sub(2)), (y as usize).min(self.height.saturating_sub(2)));
+        let (fx, fy) = ((x - i as f64) as f32, (y - j as f64) as f32);
+        let (right, down) = (usize::from(self.width > 1), if self.height > 1 { self.width } else { 0 });
+        let k = j * self.width + i;
+        let v = &self.values;
+        let top = v[k] + (v[k + right] - v[k]) * fx;
+        let bottom = v[k + down] + (v[k + down + right] - v[k + down]) * fx;
+        Some(top + (bottom - top) * fy)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sampling_a_ramp_is_exact_and_stops_at_the_border() {
+        let grid = Grid::new(4, 3, (0..12).map(|i| (i % 4) as f32 + 10.0 * (i / 4) as f32).collect());
+        assert_eq!(grid.sample([1.75, 1.0]), Some(1.25 + 5.0));
+        assert_eq!(grid.sample([3.5, 2.5]), Some(23.0));
+        assert_eq!(grid.sample([0.4, 1.0]), None);
+        assert_eq!(grid.sample([3.6, 1.0]), None);
+    }
+
+    #[test]
+    fn reducing_averages_blocks() {
+        let grid = Grid::new(4, 2, vec![1.0, 3.0, 0.0, 0.0, 5.0, 7.0, 0.0, 4.0]);
+        assert_eq!(grid.reduced(2).values, vec![4.0, 1.0]);
+    }
+}

@@ -1,0 +1,504 @@
+//! Where the assembly stands in a photo: a search over the pose on the plate, carried through the camera.
+//!
+//! In: orientation fields of the photo, edge points with 3-D positions. Out: a pose with its score. Coarse: all poses of
+//! a grid, scored by the mean agreement of edge orientations, polarity kept (Steger 2002; the exhaustive first level of
+//! the paper's search). Fine: the best few follow their edges to sub-pixel accuracy by robust least squares. Never
+//! judges a component.
+
+use super::camera::{Camera, Vec3, sub};
+use super::grid::Grid;
+use super::haar::Integral;
+use super::linear;
+use super::model::{Locator, PointGroup};
+use super::pose::{Installation, Pose};
+
+/// How many coarse poses are refined.
+const BEAM: usize = 12;
+/// A coarse step moves edge points by at most this many coarse px.
+const COARSE_STEP_PX: f64 = 1.0;
+/// Search along the edge normal in the fine field's px: first and last reach.
+const FIRST_REACH: f64 = 3.0;
+const LAST_REACH: f64 = 1.25;
+const ROUNDS: usize = 9;
+/// Scale of the robust weight on the distance to an edge (fine px).
+const ROBUST_SCALE: f64 = 0.5;
+/// Standard deviation of one edge point's position (fine px): measurement noise of the calibration's least squares.
+const EDGE_SIGMA: f64 = 0.7;
+/// Agreement an edge must have to count.
+const LEAST_AGREEMENT: f32 = 0.5;
+
+/// Gradient directions of a photo at one resolution.
+pub struct Field {
+    width: usize,
+    height: usize,
+    /// Gradient at pixel corners, divided by its length plus the noise level.
+    orientation: Vec<[f32; 2]>,
+    /// The gradient itself.
+    gradient: Vec<[f32; 2]>,
+}
+
+impl Field {
+    /// Orientations of `grid`, whose noise has standard deviation `noise`; `smooth` averages orientations over 3 x 3 px so
+    /// that a coarse grid of poses cannot step over an edge.
+    pub fn new(grid: &Grid, noise: f64, smooth: bool) -> Field {
+        let (width, height) = (grid.width + 1, grid.height + 1);
+        let integral = Integral::new(grid);
+        let floor = (3.0 * noise / 2.0).max(1e-6) as f32;
+        let mut gradient = vec![[0.0; 2]; width * height];
+        for y in 1..height - 1 {
+            for x in 1..width - 1 {
+                gradient[y * width + x] = integral.gradient(x, y, 1);
+            }
+        }
+        let unit = |g: &[f32; 2]| {
+            let length = (g[0] * g[0] + g[1] * g[1]).sqrt() + floor;
+            [g[0] / length, g[1] / length]
+        };
+        let mut orientation: Vec<[f32; 2]> = gradient.iter().map(unit).collect();
+        if smooth {
+            orientation = smoothed(&orientation, width, height);
+        }
+        Field { width, height, orientation, gradient }
+    }
+
+    /// Agreement of a unit direction with the orientation at a point (field px); 0 outside the image.
+    fn agreement(&self, at: [f64; 2], direction: [f32; 2]) -> f32 {
+        let (x, y) = (at[0] + 0.5, at[1] + 0.5);
+        if x < 0.0 || y < 0.0 || x >= self.width as f64 || y >= self.height as f64 {
+            return 0.0;
+        }
+        let o = self.orientation[y as usize * self.width + x as usize];
+        o[0] * direction[0] + o[1] * direction[1]
+    }
+
+    /// Gradient across an edge, bilinear; `None` outside.
+    fn slope(&self, at: [f64; 2], direction: [f32; 2]) -> Option<f32> {
+        let (x, y) = (at[0], at[1]);
+        if !(x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64) {
+            return None;
+        }
+        let (i, j) = (x as usize, y as usize);
+        let (fx, fy) = ((x - i as f64) as f32, (y - j as f64) as f32);
+        let across = |k: usize| {
+            let g = self.gradient[k];
+            g[0] * direction[0] + g[1] * direction[1]
+        };
+        let k = j * self.width + i;
+        let top = across(k) + (across(k + 1) - across(k)) * fx;
+        let bottom = across(k + self.width) + (across(k + self.width + 1) - across(k + self.width)) * fx;
+        Some(top + (bottom - top) * fy)
+    }
+}
+
+fn smoothed(field: &[[f32; 2]], width: usize, height: usize) -> Vec<[f32; 2]> {
+    let mut out = vec![[0.0; 2]; field.len()];
+    for y in 1..height.saturating_sub(1) {
+        for x in 1..width - 1 {
+            let mut sum = [0.0f32; 2];
+            for k in [y - 1, y, y + 1].map(|j| j * width + x - 1) {
+                for o in &field[k..k + 3] {
+                    sum = [sum[0] + o[0], sum[1] + o[1]];
+                }
+            }
+            out[y * width + x] = sum.map(|s| s / 9.0);
+        }
+    }
+    out
+}
+
+/// An edge point: position (mm, assembly frame) and a second point 1 mm along the edge.
+#[derive(Debug, Clone, Copy)]
+pub struct EdgePoint {
+    pub at: Vec3,
+    pub along: Vec3,
+}
+
+impl EdgePoint {
+    fn from_row(row: &[i32; 6]) -> EdgePoint {
+        let at = [0, 1, 2].map(|i| f64::from(row[i]) * 1e-3);
+        EdgePoint { at, along: [0, 1, 2].map(|i| at[i] + f64::from(row[i + 3]) * 1e-3) }
+    }
+
+    /// The row of the model file.
+    pub fn to_row(self) -> [i32; 6] {
+        let d = sub(self.along, self.at);
+        let round = |v: f64| (v * 1e3).round() as i32;
+        [round(self.at[0]), round(self.at[1]), round(self.at[2]), round(d[0]), round(d[1]), round(d[2])]
+    }
+
+    /// Place in the field's px and the direction in which light grows there.
+    fn seen(&self, camera: &Camera, pose: &Pose) -> Option<([f64; 2], [f32; 2])> {
+        let p = camera.project(pose.apply(self.at))?;
+        let q = camera.project(pose.apply(self.along))?;
+        let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
+        let length = (dx * dx + dy * dy).sqrt();
+        (length > 1e-9).then(|| (p, [(-dy / length) as f32, (dx / length) as f32]))
+    }
+}
+
+/// The model's edge points, ready to search with.
+pub struct Search {
+    coarse_factor: u32,
+    fine_factor: u32,
+    groups: Vec<Vec<Alternative>>,
+}
+
+struct Alternative {
+    coarse: Vec<EdgePoint>,
+    fine: Vec<EdgePoint>,
+}
+
+/// A pose with what speaks for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Located {
+    pub pose: Pose,
+    /// Mean agreement of the fine edge points, -1..1.
+    pub score: f64,
+}
+
+/// The fields of one photo.
+pub struct Fields {
+    pub coarse: Field,
+    pub fine: Field,
+}
+
+impl Search {
+    pub fn new(locator: &Locator) -> Search {
+        let points = |rows: &[[i32; 6]]| rows.iter().map(EdgePoint::from_row).collect();
+        let group = |g: &PointGroup| {
+            g.alternatives.iter().map(|s| Alternative { coarse: points(&s.coarse), fine: points(&s.fine) }).collect()
+        };
+        Search {
+            coarse_factor: locator.coarse,
+            fine_factor: locator.fine,
+            groups: locator.groups.iter().map(group).collect(),
+        }
+    }
+
+    /// Orientation fields of a photo whose pixels have noise `noise`.
+    pub fn fields(&self, photo: &Grid, noise: f64) -> Fields {
+        let field =
+            |factor: u32, smooth| Field::new(&photo.reduced(factor as usize), noise / f64::from(factor), smooth);
+        Fields { coarse: field(self.coarse_factor, true), fine: field(self.fine_factor, false) }
+    }
+
+    /// The best pose within `standing` (ranges of x, y, z, rz), or `None` when there is nothing to go by.
+    pub fn locate(&self, fields: &Fields, camera: &Camera, standing: &[[f64; 2]; 4]) -> Option<Located> {
+        let candidates = self.coarse(fields, &camera.reduced(self.coarse_factor), standing);
+        let fine = camera.reduced(self.fine_factor);
+        let refined = candidates.into_iter().map(|pose| {
+            let pose = self.refine(&fields.fine, &fine, pose, standing);
+            Located { pose, score: self.score(&fields.fine, &fine, &pose) }
+        });
+        refined.max_by(|a, b| a.score.total_cmp(&b.score))
+    }
+
+    /// The best poses of the grid, one per neighbourhood, best first.
+    fn coarse(&self, fields: &Fields, camera: &Camera, standing: &[[f64; 2]; 4]) -> Vec<Pose> {
+        let axes = self.grid(camera, standing);
+        let mut scored = Vec::new();
+        for &rz in &axes[3] {
+            for &z in &axes[2] {
+                let sheet = self.sheet(camera, z, rz, &axes);
+                for (i, &x) in axes[0].iter().enumerate() {
+                    for (j, &y) in axes[1].iter().enumerate() {
+                        let score = sheet.score(&fields.coarse, x - axes[0][0], y - axes[1][0]);
+                        scored.push((score, Pose { x, y, z, rz }, [i, j]));
+                    }
+                }
+            }
+        }
+        scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let step = axes.each_ref().map(|a| if a.len() > 1 { a[1] - a[0] } else { 1.0 });
+        let mut kept: Vec<Pose> = Vec::new();
+        for (_, pose, _) in scored {
+            let near = |k: &Pose| {
+                let (a, b) = (k.to_array(), pose.to_array());
+                (0..4).all(|i| (a[i] - b[i]).abs() < 1.5 * step[i])
+            };
+            if !kept.iter().any(near) {
+                kept.push(pose);
+            }
+            if kept.len() == BEAM {
+                break;
+            }
+        }
+        kept
+    }
+
+    /// Grid values along each axis, so fine that no edge point moves more than a coarse step.
+    fn grid(&self, camera: &Camera, standing: &[[f64; 2]; 4]) -> [Vec<f64>; 4] {
+        let home = Pose::from_array(standing.map(|[a, b]| (a + b) / 2.0));
+        let mut axes = [const { Vec::new() }; 4];
+        for (axis, values) in axes.iter_mut().enumerate() {
+            let [low, high] = standing[axis];
+            let small = (high - low).max(1e-9) * 1e-3;
+            let mut moved = home.to_array();
+            moved[axis] += small;
+            let speed = self.speed(camera, &home, &Pose::from_array(moved)) / small;
+            let steps = ((high - low) * speed / COARSE_STEP_PX).ceil().clamp(0.0, 400.0);
+            let steps = if high - low < 1e-9 { 0.0 } else { steps.max(2.0) };
+            let at = |i: u32| if steps == 0.0 { low } else { low + (high - low) * f64::from(i) / steps };
+            values.extend((0..=steps as u32).map(at));
+        }
+        axes
+    }
+
+    /// Root mean square motion of the coarse edge points between two poses (px).
+    fn speed(&self, camera: &Camera, a: &Pose, b: &Pose) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for point in self.groups.iter().flatten().flat_map(|alternative| &alternative.coarse) {
+            if let (Some(p), Some(q)) = (camera.project(a.apply(point.at)), camera.project(b.apply(point.at))) {
+                sum += (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2);
+                count += 1.0;
+            }
+        }
+        if count == 0.0 { 0.0 } else { f64::sqrt(sum / count) }
+    }
+
+    /// The coarse points at one height and turn, with their motion per mm of x and y.
+    fn sheet(&self, camera: &Camera, z: f64, rz: f64, axes: &[Vec<f64>; 4]) -> Sheet {
+        let base = Pose { x: axes[0][0], y: axes[1][0], z, rz };
+        let (dx, dy) = (axes[0][axes[0].len() - 1] - base.x, axes[1][axes[1].len() - 1] - base.y);
+        let (dx, dy) = (dx.max(1e-6), dy.max(1e-6));
+        let place = |point: &EdgePoint| -> Option<SheetPoint> {
+            let middle = Pose { x: base.x + dx / 2.0, y: base.y + dy / 2.0, ..base };
+            let (_, direction) = point.seen(camera, &middle)?;
+            let at = camera.project(base.apply(point.at))?;
+            let right = camera.project(Pose { x: base.x + dx, ..base }.apply(point.at))?;
+            let up = camera.project(Pose { y: base.y + dy, ..base }.apply(point.at))?;
+            let per = |q: [f64; 2], d: f64| [(q[0] - at[0]) / d, (q[1] - at[1]) / d];
+            Some(SheetPoint { at, per_x: per(right, dx), per_y: per(up, dy), direction })
+        };
+        let alternatives =
+            |group: &Vec<Alternative>| group.iter().map(|a| a.coarse.iter().filter_map(place).collect()).collect();
+        Sheet { groups: self.groups.iter().map(alternatives).collect() }
+    }
+
+    /// Mean agreement of the fine points at a pose; groups count by their number of points.
+    pub fn score(&self, field: &Field, camera: &Camera, pose: &Pose) -> f64 {
+        let mean = |alternative: &Alternative| {
+            let sum: f64 = alternative
+                .fine
+                .iter()
+                .filter_map(|p| p.seen(camera, pose))
+                .map(|(at, direction)| f64::from(field.agreement(at, direction)))
+                .sum();
+            sum / alternative.fine.len().max(1) as f64
+        };
+        let (mut total, mut weight) = (0.0, 0.0);
+        for group in self.groups.iter().filter(|g| g.iter().any(|a| !a.fine.is_empty())) {
+            let points = group.iter().map(|a| a.fine.len()).max().unwrap_or(0) as f64;
+            total += points * group.iter().map(mean).fold(f64::NEG_INFINITY, f64::max);
+            weight += points;
+        }
+        if weight == 0.0 { 0.0 } else { total / weight }
+    }
+
+    /// The fine points of the alternatives that fit best at a pose.
+    fn chosen(&self, field: &Field, camera: &Camera, pose: &Pose) -> Vec<EdgePoint> {
+        let agreement = |a: &Alternative| {
+            let seen = a.fine.iter().filter_map(|p| p.seen(camera, pose));
+            seen.map(|(at, d)| field.agreement(at, d)).sum::<f32>() / a.fine.len().max(1) as f32
+        };
+        let best = |group: &Vec<Alternative>| {
+            let scored = group.iter().map(|a| (agreement(a), a));
+            scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, a)| a.fine.clone()).unwrap_or_default()
+        };
+        self.groups.iter().flat_map(best).collect()
+    }
+
+    /// Follows the edges from `pose` by robust least squares over the axes that may vary.
+    fn refine(&self, field: &Field, camera: &Camera, pose: Pose, standing: &[[f64; 2]; 4]) -> Pose {
+        let free: Vec<usize> = (0..4).filter(|&i| standing[i][1] - standing[i][0] > 1e-9).collect();
+        let spread = free.iter().map(|&i| (standing[i][1] - standing[i][0]) * 10.0).collect::<Vec<_>>();
+        let with = |parameters: &[f64]| {
+            let mut array = pose.to_array();
+            free.iter().zip(parameters).for_each(|(&i, v)| array[i] += v);
+            Pose::from_array(array)
+        };
+        let view = View { field, camera };
+        let parameters = follow(&spread, |parameters, reach| {
+            let pose = with(parameters);
+            let points = self.chosen(field, camera, &pose);
+            view.pulls(&points, reach, parameters, |p, point| camera.project(with(p).apply(point.at)), &pose, camera)
+        });
+        let mut array = with(&parameters).to_array();
+        for (value, [low, high]) in array.iter_mut().zip(standing) {
+            // A tenth of the range beyond its ends: the ranges are a promise, not a law.
+            let margin = (high - low) * 0.1;
+            *value = value.clamp(low - margin, high + margin);
+        }
+        Pose::from_array(array)
+    }
+
+    /// Poses of several photos and the installation they share, from starting poses: regularised by the spec's priors.
+    pub fn install(
+        &self,
+        fields: &[Fields],
+        nominal: &Camera,
+        starts: &[Pose],
+        standing: &[[f64; 2]; 4],
+        spread: &[f64; 8],
+    ) -> (Installation, Vec<Pose>) {
+        let free: Vec<usize> = (0..4).filter(|&i| standing[i][1] - standing[i][0] > 1e-9).collect();
+        let mut spreads = spread.to_vec();
+        for _ in starts {
+            spreads.extend(free.iter().map(|&i| standing[i][1] - standing[i][0]));
+        }
+        let split = |parameters: &[f64], photo: usize| {
+            let mut eight = [0.0; 8];
+            eight.copy_from_slice(&parameters[..8]);
+            let mut array = starts[photo].to_array();
+            let own = &parameters[8 + photo * free.len()..];
+            free.iter().zip(own).for_each(|(&i, v)| array[i] += v);
+            (Installation::from_array(eight), Pose::from_array(array))
+        };
+        let parameters = follow(&spreads, |parameters, reach| {
+            let mut all = Vec::new();
+            for (photo, fields) in fields.iter().enumerate() {
+                let (installation, pose) = split(parameters, photo);
+                let camera = installation.apply(nominal).reduced(self.fine_factor);
+                let points = self.chosen(&fields.fine, &camera, &pose);
+                let view = View { field: &fields.fine, camera: &camera };
+                let project = |p: &[f64], point: &EdgePoint| {
+                    let (installation, pose) = split(p, photo);
+                    installation.apply(nominal).reduced(self.fine_factor).project(pose.apply(point.at))
+                };
+                all.extend(view.pulls(&points, reach, parameters, project, &pose, &camera));
+            }
+            all
+        });
+        let installation = split(&parameters, 0).0;
+        (installation, (0..starts.len()).map(|photo| split(&parameters, photo).1).collect())
+    }
+}
+
+struct Sheet {
+    groups: Vec<Vec<Vec<SheetPoint>>>,
+}
+
+struct SheetPoint {
+    at: [f64; 2],
+    per_x: [f64; 2],
+    per_y: [f64; 2],
+    direction: [f32; 2],
+}
+
+impl Sheet {
+    /// Sum over groups of the best alternative's mean agreement, weighted by its number of points.
+    fn score(&self, field: &Field, dx: f64, dy: f64) -> f64 {
+        let mean = |points: &Vec<SheetPoint>| {
+            let sum: f32 = points
+                .iter()
+                .map(|p| {
+                    let at = [0, 1].map(|i| p.at[i] + dx * p.per_x[i] + dy * p.per_y[i]);
+                    field.agreement(at, p.direction)
+                })
+                .sum();
+            f64::from(sum) / points.len().max(1) as f64
+        };
+        let group = |alternatives: &Vec<Vec<SheetPoint>>| {
+            let points = alternatives.iter().map(Vec::len).max().unwrap_or(0) as f64;
+            points * alternatives.iter().map(mean).fold(f64::NEG_INFINITY, f64::max)
+        };
+        self.groups.iter().filter(|g| g.iter().any(|a| !a.is_empty())).map(group).sum()
+    }
+}
+
+/// One edge point's wish: how far the image of the point should move along its normal, how that motion depends on the
+/// parameters, and how much the wish counts.
+struct Pull {
+    distance: f64,
+    gradient: Vec<f64>,
+    weight: f64,
+}
+
+struct View<'a> {
+    field: &'a Field,
+    camera: &'a Camera,
+}
+
+impl View<'_> {
+    fn pulls(
+        &self,
+        points: &[EdgePoint],
+        reach: f64,
+        parameters: &[f64],
+        project: impl Fn(&[f64], &EdgePoint) -> Option<[f64; 2]>,
+        pose: &Pose,
+        camera: &Camera,
+    ) -> Vec<Pull> {
+        debug_assert!(std::ptr::eq(self.camera, camera));
+        points
+            .iter()
+            .filter_map(|point| {
+                let (at, direction) = point.seen(self.camera, pose)?;
+                let (distance, agreement) = self.nearest_edge(at, direction, reach)?;
+                let along = |p: [f64; 2]| p[0] * f64::from(direction[0]) + p[1] * f64::from(direction[1]);
+                let here = along(project(parameters, point)?);
+                let mut gradient = Vec::with_capacity(parameters.len());
+                let mut moved = parameters.to_vec();
+                for i in 0..parameters.len() {
+                    /// Small against every parameter's range, large against rounding: mm, rad or shares.
+                    const STEP: f64 = 1e-5;
+                    moved[i] += STEP;
+                    gradient.push((along(project(&moved, point)?) - here) / STEP);
+                    moved[i] = parameters[i];
+                }
+                let robust = 1.0 / (1.0 + (distance / ROBUST_SCALE).powi(2));
+                Some(Pull { distance, gradient, weight: f64::from(agreement) * robust })
+            })
+            .collect()
+    }
+
+    /// Distance along the normal to the steepest edge of the right polarity within reach, sub-pixel, and its agreement.
+    fn nearest_edge(&self, at: [f64; 2], direction: [f32; 2], reach: f64) -> Option<(f64, f32)> {
+        const STEP: f64 = 0.5;
+        let steps = (reach / STEP).round() as i32;
+        let point = |t: f64| [at[0] + t * f64::from(direction[0]), at[1] + t * f64::from(direction[1])];
+        let slopes: Option<Vec<f32>> =
+            (-steps..=steps).map(|i| self.field.slope(point(f64::from(i) * STEP), direction)).collect();
+        let slopes = slopes?;
+        let best = (0..slopes.len()).max_by(|&a, &b| slopes[a].total_cmp(&slopes[b]))?;
+        if best == 0 || best + 1 == slopes.len() {
+            return None;
+        }
+        let [a, b, c] = [slopes[best - 1], slopes[best], slopes[best + 1]].map(f64::from);
+        let bend = a - 2.0 * b + c;
+        let shift = if bend < 0.0 { 0.5 * (a - c) / bend } else { 0.0 };
+        let distance = (best as f64 - f64::from(steps) + shift) * STEP;
+        let agreement = self.field.agreement(point(distance), direction);
+        (agreement > LEAST_AGREEMENT).then_some((distance, agreement))
+    }
+}
+
+/// Gauss and Newton with priors: parameters start at 0 and are pulled back with their `spread`.
+fn follow(spread: &[f64], pulls: impl Fn(&[f64], f64) -> Vec<Pull>) -> Vec<f64> {
+    let n = spread.len();
+    let mut parameters = vec![0.0; n];
+    for round in 0..ROUNDS {
+        let t = round as f64 / (ROUNDS - 1) as f64;
+        let pulls = pulls(&parameters, FIRST_REACH + (LAST_REACH - FIRST_REACH) * t);
+        let mut a = vec![0.0; n * n];
+        let mut b = vec![0.0; n];
+        let scale = 1.0 / (EDGE_SIGMA * EDGE_SIGMA);
+        for pull in &pulls {
+            for i in 0..n {
+                let gi = pull.gradient[i] * pull.weight * scale;
+                b[i] += gi * pull.distance;
+                for j in 0..n {
+                    a[i * n + j] += gi * pull.gradient[j];
+                }
+            }
+        }
+        for i in 0..n {
+            let precision = 1.0 / (spread[i] * spread[i]);
+            a[i * n + i] += precision;
+            b[i] -= parameters[i] * precision;
+        }
+        let Some(step) = linear::solve_spd(&a, &b) else { break };
+        parameters.iter_mut().zip(&step).for_each(|(p, s)| *p += s);
+    }
+    parameters
+}

@@ -1,0 +1,163 @@
+//! A node's window on the photo: the pixels of the node carried to the photo through the node's plane and the camera.
+//!
+//! In: where the node lies in the nominal photo, a pose, a camera. Out: the node's image cut from a photo, and its Haar
+//! coefficients inside the mask. Training cuts renders with the same code, so what is trained is what will judge.
+
+use super::camera::{Camera, Vec3};
+use super::grid::Grid;
+use super::haar::Integral;
+use super::model::Node;
+use super::pose::Pose;
+
+/// Where a node lies in the nominal photo.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Height of its plane (mm, assembly frame).
+    pub plane: f64,
+    /// px of the photo per px of the node.
+    pub factor: u32,
+    /// Top left corner and size in node px.
+    pub origin: [i32; 2],
+    pub size: [u32; 2],
+}
+
+impl Frame {
+    pub fn of(node: &Node) -> Frame {
+        Frame { plane: node.plane, factor: node.factor, origin: node.origin, size: node.size }
+    }
+}
+
+/// The node's pixels as points of the assembly.
+pub struct Window {
+    pub frame: Frame,
+    points: Vec<Vec3>,
+}
+
+/// Places of the node's pixels in a photo reduced by the node's factor (px).
+pub struct Placed(Vec<[f64; 2]>);
+
+impl Window {
+    /// # Errors
+    /// `None` when the node's plane is not in front of the camera.
+    pub fn new(frame: Frame, nominal: &Camera, home: &Pose) -> Option<Window> {
+        let camera = nominal.reduced(frame.factor);
+        let mut points = Vec::with_capacity((frame.size[0] * frame.size[1]) as usize);
+        for y in 0..frame.size[1] {
+            for x in 0..frame.size[0] {
+                let pixel = [f64::from(frame.origin[0]) + f64::from(x), f64::from(frame.origin[1]) + f64::from(y)];
+                let point = camera.on_plane(pixel.map(|v| v + 0.5), frame.plane + home.z)?;
+                points.push(home.invert(point));
+            }
+        }
+        Some(Window { frame, points })
+    }
+
+    /// Where the pixels lie in a photo by `camera` of an assembly at `pose`.
+    pub fn place(&self, camera: &Camera, pose: &Pose) -> Placed {
+        let camera = camera.reduced(self.frame.factor);
+        let outside = [f64::NEG_INFINITY; 2];
+        Placed(self.points.iter().map(|&p| camera.project(pose.apply(p)).unwrap_or(outside)).collect())
+    }
+
+    /// The node's image from a photo already reduced by the node's factor, moved by `shift` (node px). The second value is the
+    /// share of pixels inside the photo; those outside repeat their left neighbour.
+    pub fn cut(&self, reduced: &Grid, placed: &Placed, shift: [f64; 2]) -> (Grid, f64) {
+        let [width, height] = self.frame.size.map(|s| s as usize);
+        let mut values = Vec::with_capacity(width * height);
+        let (mut last, mut inside) = (0.0, 0usize);
+        for p in &placed.0 {
+            if let Some(v) = reduced.sample([p[0] + shift[0], p[1] + shift[1]]) {
+                last = v;
+                inside += 1;
+            }
+            values.push(last);
+        }
+        let share = inside as f64 / values.len() as f64;
+        (Grid::new(width, height, values), share)
+    }
+}
+
+/// The Haar cells of a node: inside its mask, at every level, half overlapping.
+pub struct Stencil {
+    cells: Vec<Cell>,
+    /// First coefficient of each level; two coefficients a cell.
+    pub levels: Vec<std::ops::Range<usize>>,
+}
+
+struct Cell {
+    x: usize,
+    y: usize,
+    half: usize,
+}
+
+impl Stencil {
+    /// Levels 1..=`levels` of the cells whose centre is in the mask and whose square is in the node. A level with no cell
+    /// ends the list.
+    pub fn new(mask: &[Vec<bool>], levels: u32) -> Stencil {
+        let (width, height) = (mask.first().map_or(0, Vec::len), mask.len());
+        let mut stencil = Stencil { cells: Vec::new(), levels: Vec::new() };
+        for half in (0..levels).map(|l| 1usize << l) {
+            let start = 2 * stencil.cells.len();
+            for y in (half..(height + 1).saturating_sub(half)).step_by(half) {
+                for x in (half..(width + 1).saturating_sub(half)).step_by(half) {
+                    // The cell's centre is a pixel corner: it counts when one of the four pixels around it does.
+                    if mask[y - 1][x - 1] || mask[y - 1][x] || mask[y][x - 1] || mask[y][x] {
+                        stencil.cells.push(Cell { x, y, half });
+                    }
+                }
+            }
+            if 2 * stencil.cells.len() == start {
+                break;
+            }
+            stencil.levels.push(start..2 * stencil.cells.len());
+        }
+        stencil
+    }
+
+    /// Number of coefficients.
+    pub fn len(&self) -> usize {
+        2 * self.cells.len()
+    }
+
+    /// H and V of every cell.
+    pub fn coefficients(&self, image: &Grid) -> Vec<f32> {
+        let integral = Integral::new(image);
+        self.cells.iter().flat_map(|c| integral.gradient(c.x, c.y, c.half)).collect()
+    }
+
+    /// True for the coefficients whose cell holds a pixel at or above `limit`.
+    pub fn touching(&self, image: &Grid, limit: f32) -> Vec<bool> {
+        let over = Grid::new(image.width, image.height, image.values.iter().map(|&v| f32::from(v >= limit)).collect());
+        let integral = Integral::new(&over);
+        self.cells.iter().flat_map(|c| [integral.sum(c.x, c.y, c.half) > 0.5; 2]).collect()
+    }
+}
+
+/// A node's mask, pixel by pixel.
+pub fn mask_of(node: &Node) -> Vec<Vec<bool>> {
+    let row = |runs: &Vec<u32>| {
+        let mut row = vec![false; node.size[0] as usize];
+        for run in runs.chunks_exact(2) {
+            row[run[0] as usize..(run[0] + run[1]) as usize].fill(true);
+        }
+        row
+    };
+    node.mask.iter().map(row).collect()
+}
+
+/// A mask as the model file writes it.
+pub fn runs_of(mask: &[Vec<bool>]) -> Vec<Vec<u32>> {
+    let runs = |row: &Vec<bool>| {
+        let mut out = Vec::new();
+        let mut x = 0;
+        while x < row.len() {
+            let end = x + row[x..].iter().take_while(|&&m| m).count();
+            if end > x {
+                out.extend([x as u32, (end - x) as u32]);
+            }
+            x = end.max(x + 1);
+        }
+        out
+    };
+    mask.iter().map(runs).collect()
+}
