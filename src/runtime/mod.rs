@@ -2,10 +2,13 @@
 //!
 //! An island: it knows nothing of the compiler and builds alone with `--no-default-features`.
 
+pub mod calibrate;
 pub mod camera;
 pub mod density;
 pub mod grid;
 mod haar;
+pub mod inspect;
+pub mod judge;
 pub mod linear;
 pub mod locate;
 pub mod model;

@@ -1,0 +1,211 @@
+//! One photo of a good assembly fits a model to its station: how the camera hangs, what the lamps give, how much the
+//! sensor's values scatter.
+//!
+//! In: a model and photos of correct assemblies. Out: [`Calibration`], or the reason why the photo is refused. A part's
+//! own reflectance is not calibrated: parts differ.
+
+use super::grid::Grid;
+use super::inspect::{Decision, Inspector};
+use super::judge::{LightFit, Prepared, fit_lamps};
+use super::linear;
+use super::locate::{Fields, Search};
+use super::model::{self, Model, ModelError};
+use super::photo::Photo;
+use super::pose::{Installation, Pose};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Photos that correlate less with their re-synthesis are refused.
+const LEAST_CORRELATION: f64 = 0.4;
+/// Weight of the spec's lamp powers against the photo, share of the photo's own evidence.
+const PRIOR_PULL: f64 = 1e-3;
+/// Sensor noise that every 8-bit photo has: the rounding (share of full scale).
+const ROUNDING: f64 = 1.0 / (255.0 * 3.464);
+/// Format of the calibration file.
+pub const FORMAT: u32 = 1;
+
+/// What one photo tells about a station.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibration {
+    pub format: u32,
+    /// Digest of the model it belongs to.
+    pub model: String,
+    pub installation: Installation,
+    /// Weight of each lamp: photo value = sum of weight times lamp image.
+    pub lamps: Vec<f64>,
+    /// Standard deviation of the sensor's noise, share of full scale.
+    pub noise: f64,
+    /// Where the assembly stood in each photo.
+    pub poses: Vec<Pose>,
+    /// Locator's score and correlation of the photo's gradients with the re-synthesis.
+    pub score: f64,
+    pub correlation: f64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum CalibrationError {
+    NoPhoto,
+    /// The model's own numbers do not fit together.
+    Unusable,
+    NotFound {
+        score: f64,
+        least: f64,
+    },
+    PoorFit {
+        correlation: f64,
+    },
+    /// The photo shows a fault, so it would teach it.
+    Faulty {
+        component: String,
+        fault: String,
+    },
+}
+
+impl fmt::Display for CalibrationError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            CalibrationError::NoPhoto => write!(f, "E0806: a calibration needs at least one photo"),
+            CalibrationError::Unusable => write!(f, "E0803: the model's camera cannot see its own nodes"),
+            CalibrationError::NotFound { score, least } => {
+                write!(f, "E0805: the assembly was not found in the photo (score {score:.2}, at least {least:.2}): ")?;
+                write!(f, "is it the right station, and is the assembly where the spec says?")
+            }
+            CalibrationError::PoorFit { correlation } => {
+                write!(f, "E0807: the photo does not look like the assembly under any mix of the station's lamps ")?;
+                write!(f, "(correlation {correlation:.2}, at least {LEAST_CORRELATION})")
+            }
+            CalibrationError::Faulty { component, fault } => {
+                write!(f, "E0808: the photo itself shows a fault ({component}: {fault}); ")?;
+                write!(f, "calibrate with a photo of a correct assembly")
+            }
+        }
+    }
+}
+
+impl std::error::Error for CalibrationError {}
+
+impl Calibration {
+    /// The spec's word for everything: what is used before any photo was taken.
+    pub fn nominal(model: &Model) -> Calibration {
+        Calibration {
+            format: FORMAT,
+            model: model.digest(),
+            installation: Installation::default(),
+            lamps: model.station.lamps.iter().map(|l| l.power).collect(),
+            noise: model.station.noise.max(ROUNDING),
+            poses: Vec::new(),
+            score: 0.0,
+            correlation: 0.0,
+        }
+    }
+
+    pub fn write(&self) -> String {
+        model::seal(&model::to_ron(self))
+    }
+
+    /// Reads a calibration and checks that it belongs to `model`.
+    pub fn read(text: &str, model: &Model) -> Result<Calibration, ModelError> {
+        let body = model::open(text, FORMAT)?;
+        let malformed = |why: &str| ModelError::Malformed(why.into());
+        let calibration: Calibration =
+            ron::from_str(body).map_err(|e| ModelError::Malformed(format!("not a calibration: {e}")))?;
+        if calibration.model != model.digest() {
+            return Err(malformed("the calibration belongs to another model: calibrate again"));
+        }
+        let finite = calibration.lamps.iter().chain(&calibration.installation.to_array()).all(|v| v.is_finite());
+        let lamps = calibration.lamps.len() == model.station.lamps.len();
+        if !finite || !lamps || calibration.noise.is_nan() || calibration.noise <= 0.0 {
+            return Err(malformed("the calibration's numbers are out of range"));
+        }
+        Ok(calibration)
+    }
+}
+
+/// Calibrates `model` by photos of correct assemblies; the first fixes light and noise, all fix the camera.
+pub fn calibrate(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationError> {
+    let calibration = fit(model, photos)?;
+    let inspector = Inspector::new(model, &calibration).ok_or(CalibrationError::Unusable)?;
+    for photo in photos {
+        let verdict = inspector.inspect(photo);
+        if let (Decision::NoGo, Some(finding)) = (verdict.decision, verdict.findings.first()) {
+            let (component, fault) = (finding.component.clone(), finding.fault.clone());
+            return Err(CalibrationError::Faulty { component, fault });
+        }
+    }
+    Ok(calibration)
+}
+
+/// The calibration without the question whether the photos show a fault.
+pub fn fit(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationError> {
+    let first = photos.first().ok_or(CalibrationError::NoPhoto)?;
+    let prepared = Prepared::new(model).ok_or(CalibrationError::Unusable)?;
+    let noise = noise_of(&first.light).max(ROUNDING);
+    let search = Search::new(&model.locator);
+    let fields: Vec<Fields> = photos.iter().map(|p| search.fields(&p.light, noise)).collect();
+    let (installation, poses, score) = install(model, &search, &fields)?;
+    let camera = installation.apply(&model.station.camera);
+    let pyramid = prepared.pyramid(&first.light);
+    let prior: Vec<f64> = model.station.lamps.iter().map(|l| l.power).collect();
+    let good = vec![0; prepared.nodes.len()];
+    let evidence = prepared.light_evidence(&pyramid, &camera, &poses[0], &good);
+    let LightFit { weights, correlation } = fit_lamps(&evidence, &prior, PRIOR_PULL);
+    if correlation < LEAST_CORRELATION {
+        return Err(CalibrationError::PoorFit { correlation });
+    }
+    let model = model.digest();
+    Ok(Calibration { format: FORMAT, model, installation, lamps: weights, noise, poses, score, correlation })
+}
+
+/// The camera as it hangs, from where the assemblies are found.
+fn install(
+    model: &Model,
+    search: &Search,
+    fields: &[Fields],
+) -> Result<(Installation, Vec<Pose>, f64), CalibrationError> {
+    let station = &model.station;
+    let wide = widened(model);
+    let mut starts = Vec::new();
+    for fields in fields {
+        let found = search.locate(fields, &station.camera, &wide);
+        let least = model.locator.accept;
+        let found = found.ok_or(CalibrationError::NotFound { score: 0.0, least })?;
+        if found.score < least {
+            return Err(CalibrationError::NotFound { score: found.score, least });
+        }
+        starts.push(found.pose);
+    }
+    let spread = Installation::spread(&station.install);
+    let (installation, poses) = search.install(fields, &station.camera, &starts, &station.standing, &spread);
+    let camera = installation.apply(&station.camera).reduced(model.locator.fine);
+    let score = search.score(&fields[0].fine, &camera, &poses[0]);
+    Ok((installation, poses, score))
+}
+
+/// The standing ranges, widened by what an installation error looks like on the plate.
+fn widened(model: &Model) -> [[f64; 2]; 4] {
+    let station = &model.station;
+    let distance = station.camera.position.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let length = station.install.position_mm + station.install.angle_rad * distance;
+    let margins = [length, length, 0.0, station.install.angle_rad * 2.0];
+    let mut wide = station.standing;
+    for (range, margin) in wide.iter_mut().zip(margins) {
+        if range[1] > range[0] {
+            *range = [range[0] - margin, range[1] + margin];
+        }
+    }
+    wide
+}
+
+/// Standard deviation of the pixel noise from the diagonal Haar band of level 1, which edges hardly reach
+/// (Donoho and Johnstone 1994): σ = 2 · median |D| / 0.6745 with D = (a + d - b - c) / 4.
+pub fn noise_of(light: &Grid) -> f64 {
+    let mut diagonal = Vec::with_capacity(light.values.len() / 4);
+    for y in (0..light.height - 1).step_by(2) {
+        for x in (0..light.width - 1).step_by(2) {
+            let d = light.at(x, y) + light.at(x + 1, y + 1) - light.at(x + 1, y) - light.at(x, y + 1);
+            diagonal.push((d / 4.0).abs());
+        }
+    }
+    2.0 * f64::from(linear::median(&mut diagonal)) / 0.6745
+}
