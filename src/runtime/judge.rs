@@ -31,8 +31,8 @@ pub struct NodeImages {
 impl NodeImages {
     /// `None` when the node's plane is behind the camera.
     pub fn new(node: &Node, nominal: &Camera, home: &Pose, lamps: usize) -> Option<NodeImages> {
-        let step = node.step as f32;
         let grid = |image: &Image| {
+            let step = node.steps[image.lamp as usize] as f32;
             let values = image.rows.iter().flatten().map(|&v| f32::from(v) * step).collect();
             Grid::new(node.size[0] as usize, node.size[1] as usize, values)
         };
@@ -150,6 +150,14 @@ impl NodeImages {
         };
         let log_likelihoods = densities.iter().zip(&best).map(robust).collect();
         Evidence { log_likelihoods, inside, shift: shifted[best[0].1].1 }
+    }
+
+    /// The shift (node px) at which a density fits best.
+    pub fn best_shift(&self, density: &Density, reduced: &Grid, camera: &Camera, pose: &Pose) -> [f64; 2] {
+        let placed = self.window.place(camera, pose);
+        let scored =
+            self.shifted(reduced, &placed).into_iter().map(|(prior, shift, z)| (density.gaussian(&z) + prior, shift));
+        scored.max_by(|a, b| a.0.total_cmp(&b.0)).map_or([0.0; 2], |(_, shift)| shift)
     }
 
     /// Log prior, shift and coefficients for every shift of the local search.

@@ -71,6 +71,13 @@ impl Field {
         o[0] * direction[0] + o[1] * direction[1]
     }
 
+    /// Gradient at the pixel corner nearest to a point; `None` outside.
+    pub fn gradient_at(&self, at: [f64; 2]) -> Option<[f32; 2]> {
+        let (x, y) = (at[0] + 0.5, at[1] + 0.5);
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
+        inside.then(|| self.gradient[y as usize * self.width + x as usize])
+    }
+
     /// Gradient across an edge, bilinear; `None` outside.
     fn slope(&self, at: [f64; 2], direction: [f32; 2]) -> Option<f32> {
         let (x, y) = (at[0], at[1]);

@@ -157,8 +157,8 @@ pub struct Node {
     pub spread: [f64; 2],
     /// Nodes whose image this component disturbs when it is faulty.
     pub disturbs: Vec<u32>,
-    /// Grey step of the integers below.
-    pub step: f64,
+    /// Per lamp, the radiance of one step of the integers below.
+    pub steps: Vec<f64>,
     /// The component is faulty when the log-likelihood ratio per coefficient is below this.
     pub threshold: f64,
     /// Log-likelihood ratios per coefficient of held-out renders, ascending.
@@ -291,7 +291,8 @@ impl Node {
         )?;
         ensure((1..=1024).contains(&self.factor), "node factor out of range")?;
         ensure(self.origin.iter().all(|o| o.abs() < 1 << 20), "node origin out of range")?;
-        ensure(self.plane.is_finite() && self.step.is_finite() && self.step > 0.0, "node numbers not finite")?;
+        let steps = self.steps.len() == lamps && self.steps.iter().all(|s| s.is_finite() && *s > 0.0);
+        ensure(self.plane.is_finite() && steps, "node numbers out of range")?;
         ensure(self.spread.iter().all(|s| s.is_finite() && *s > 0.0), "node spread out of range")?;
         ensure(self.parent.is_none_or(|p| (p as usize) < nodes), "node parent out of range")?;
         ensure(self.disturbs.iter().all(|&d| (d as usize) < nodes), "disturbed node out of range")?;

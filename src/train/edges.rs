@@ -1,0 +1,172 @@
+//! Edge points for the locator: where every good render has an edge of the same direction, whatever the light.
+//!
+//! In: shots of correct assemblies, the nominal item buffer. Out: 3-D edge points with polarity. An edge that turns its
+//! polarity with the light or the draw averages out and is left behind, and so is one on a component that a modelled
+//! fault can carry away.
+
+use super::shots::Shot;
+use crate::rng::Stream;
+use crate::runtime::camera::{Camera, Vec3, normalise, sub};
+use crate::runtime::grid::Grid;
+use crate::runtime::locate::{EdgePoint, Field};
+use crate::runtime::pose::Pose;
+
+/// Mean orientation over the draws (0..1) that a point must reach.
+const LEAST_AGREEMENT: f32 = 0.65;
+/// Noise level under which orientations fade, share of full scale.
+const NOISE: f64 = 0.01;
+
+/// A place of the nominal image: its point of the assembly, if it may serve.
+pub type Surface<'a> = dyn Fn(usize, usize) -> Option<Vec3> + 'a;
+
+/// What the edges are looked for in.
+pub struct Ground<'a> {
+    pub shots: &'a [&'a Shot],
+    pub camera: Camera,
+    pub home: Pose,
+    /// px of the photo per px of the search, a multiple of the shots' own factor.
+    pub factor: u32,
+    /// Factor of the shots.
+    pub base: u32,
+    /// Nominal lamp powers.
+    pub powers: &'a [f64],
+    pub seed: u64,
+}
+
+/// At most `count` points, evenly thinned.
+pub fn find(ground: &Ground, surface: &Surface, count: usize) -> Vec<EdgePoint> {
+    let camera = ground.camera.reduced(ground.factor);
+    let [width, height] = camera.size.map(|s| s as usize);
+    let fields: Vec<(Field, &Pose)> =
+        ground.shots.iter().enumerate().map(|(i, shot)| (field(ground, shot, i), &shot.pose)).collect();
+    let mut mean = vec![[0.0f32; 2]; (width + 1) * (height + 1)];
+    let mut points: Vec<Option<Vec3>> = vec![None; mean.len()];
+    for y in 2..height.saturating_sub(1) {
+        for x in 2..width.saturating_sub(1) {
+            let Some(point) = surface(x, y) else { continue };
+            let index = y * (width + 1) + x;
+            points[index] = Some(point);
+            mean[index] = mean_orientation(&fields, &camera, &ground.home, point, [x as f64, y as f64]);
+        }
+    }
+    let candidates = peaks(&mean, &points, width + 1, height + 1);
+    let thinned = thin(candidates, count);
+    let point = |(x, y): &(usize, usize)| {
+        let index = y * (width + 1) + x;
+        edge_point(&camera, &ground.home, points[index]?, [*x as f64, *y as f64], mean[index])
+    };
+    thinned.iter().filter_map(point).collect()
+}
+
+/// Orientation field of a shot under its own random mix of lamps.
+fn field(ground: &Ground, shot: &Shot, index: usize) -> Field {
+    let mut stream = Stream::new(ground.seed, "locator light", index as u64);
+    // From a fifth to twice the described power: a description is a prior only.
+    let weights: Vec<f64> =
+        ground.powers.iter().map(|p| p * stream.between(0.2f64.ln(), 2f64.ln()).exp()).collect();
+    let light = shot.lit(&weights).reduced((ground.factor / ground.base) as usize);
+    Field::new(&light, NOISE, false)
+}
+
+/// Mean over the shots of the unit gradient at the image of `point`, brought back to the nominal image: a gradient is a
+/// covector, so it transforms with the transposed Jacobian.
+fn mean_orientation(
+    fields: &[(Field, &Pose)],
+    camera: &Camera,
+    home: &Pose,
+    point: Vec3,
+    at: [f64; 2],
+) -> [f32; 2] {
+    let Some(steps) = steps_in_space(camera, home, point, at) else { return [0.0; 2] };
+    let mut sum = [0.0f32; 2];
+    for (field, pose) in fields {
+        let Some(p) = camera.project(pose.apply(point)) else { continue };
+        let Some(g) = field.gradient_at(p) else { continue };
+        let mut back = [0.0f32; 2];
+        for (b, step) in back.iter_mut().zip(&steps) {
+            let Some(q) = camera.project(pose.apply(*step)) else { continue };
+            *b = ((q[0] - p[0]) * f64::from(g[0]) + (q[1] - p[1]) * f64::from(g[1])) as f32;
+        }
+        let length = (back[0] * back[0] + back[1] * back[1]).sqrt();
+        let strength = length + (3.0 * NOISE / 2.0) as f32;
+        sum = [sum[0] + back[0] / strength, sum[1] + back[1] / strength];
+    }
+    sum.map(|s| s / fields.len().max(1) as f32)
+}
+
+/// The points of the assembly one px to the right of and below `at`, on the horizontal plane through `point`.
+fn steps_in_space(camera: &Camera, home: &Pose, point: Vec3, at: [f64; 2]) -> Option<[Vec3; 2]> {
+    let z = home.apply(point)[2];
+    let origin = camera.on_plane(at, z)?;
+    let step = |to: [f64; 2]| {
+        let q = camera.on_plane(to, z)?;
+        let d = sub(q, origin);
+        let p = home.apply(point);
+        Some(home.invert([p[0] + d[0], p[1] + d[1], p[2] + d[2]]))
+    };
+    Some([step([at[0] + 1.0, at[1]])?, step([at[0], at[1] + 1.0])?])
+}
+
+/// Local maxima across the edge of the mean orientation's length.
+fn peaks(mean: &[[f32; 2]], points: &[Option<Vec3>], width: usize, height: usize) -> Vec<(usize, usize)> {
+    let length = |i: usize| (mean[i][0] * mean[i][0] + mean[i][1] * mean[i][1]).sqrt();
+    let mut out = Vec::new();
+    for y in 1..height - 1 {
+        for x in 1..width - 1 {
+            let i = y * width + x;
+            let here = length(i);
+            if points[i].is_none() || here < LEAST_AGREEMENT {
+                continue;
+            }
+            let horizontal = mean[i][0].abs() > mean[i][1].abs();
+            let step = if horizontal { 1 } else { width };
+            if here >= length(i - step) && here > length(i + step) {
+                out.push((x, y));
+            }
+        }
+    }
+    out
+}
+
+/// At most `count` of the candidates, one per cell of a grid as coarse as it takes.
+fn thin(candidates: Vec<(usize, usize)>, count: usize) -> Vec<(usize, usize)> {
+    let mut stride = 1usize;
+    loop {
+        let mut kept: Vec<(usize, usize)> = Vec::new();
+        let mut taken = std::collections::BTreeSet::new();
+        for &(x, y) in &candidates {
+            if taken.insert((x / stride, y / stride)) {
+                kept.push((x, y));
+            }
+        }
+        if kept.len() <= count {
+            return kept;
+        }
+        stride += 1;
+    }
+}
+
+fn edge_point(camera: &Camera, home: &Pose, point: Vec3, at: [f64; 2], gradient: [f32; 2]) -> Option<EdgePoint> {
+    // The gradient is the edge's direction turned by +90 degrees from x to y, so the direction is (gy, -gx).
+    let length = f64::from((gradient[0] * gradient[0] + gradient[1] * gradient[1]).sqrt());
+    let direction = [f64::from(gradient[1]) / length, -f64::from(gradient[0]) / length];
+    let steps = steps_in_space(camera, home, point, at)?;
+    let along: Vec3 = std::array::from_fn(|i| {
+        (steps[0][i] - point[i]) * direction[0] + (steps[1][i] - point[i]) * direction[1]
+    });
+    let unit = normalise(along);
+    // The point lies on the pixel corner's own ray, not on the surface sample beside it.
+    let plane = camera.on_plane(at, home.apply(point)[2]).map(|p| home.invert(p))?;
+    Some(EdgePoint { at: plane, along: std::array::from_fn(|i| plane[i] + unit[i]) })
+}
+
+/// The grey value below which a share of the pixels lies.
+pub fn quantile(grid: &Grid, mask: impl Fn(usize) -> bool, share: f64) -> f32 {
+    let mut values: Vec<f32> =
+        grid.values.iter().enumerate().filter(|(i, _)| mask(*i)).map(|(_, &v)| v).collect();
+    if values.is_empty() {
+        return 0.0;
+    }
+    values.sort_by(f32::total_cmp);
+    values[((values.len() - 1) as f64 * share) as usize]
+}

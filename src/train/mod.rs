@@ -1,0 +1,205 @@
+//! Stage 7: renders and nodes become a model.
+//!
+//! In: a design, one of its stations with the camera resolved, the error modes of the assembly. Out: a [`Model`] whose error
+//! rates were measured on renders it had not seen. `train` searches and weighs with the runtime's own code, so what is
+//! trained is what will judge. Never reads a photo.
+
+mod edges;
+mod fit;
+pub mod plan;
+pub mod shots;
+mod stats;
+pub mod synthesise;
+pub mod verify;
+
+use crate::assembly::fault::ErrorMode;
+use crate::design::model::{Design, Response, Station};
+use crate::diag::Diagnostic;
+use crate::runtime::camera::Camera;
+use crate::runtime::model::{self, FORMAT, Install, Lamp, Model, Promise, Rate};
+use crate::runtime::photo::Tone;
+use crate::runtime::pose::Pose;
+use crate::scene::build;
+use fit::Context;
+use plan::Plan;
+use rayon::prelude::*;
+use shots::Setup;
+use synthesise::{Draws, Shots, synthesise};
+
+/// Customers imagined for the held-out renders.
+const CUSTOMERS: u64 = 2;
+/// Held-out draws per customer; the first calibrates.
+const HELD_OUT_DRAWS: u32 = 6;
+/// Bright matt surfaces reach this grey value (share of full scale) under the described lamps.
+const EXPOSED_TO: f64 = 0.6;
+const EXPOSED_QUANTILE: f64 = 0.95;
+
+/// What training starts from.
+pub struct Job<'a> {
+    pub design: &'a Design,
+    pub station: &'a Station,
+    /// The camera as designed (full resolution).
+    pub camera: Camera,
+    pub modes: &'a [ErrorMode],
+    /// Per component: no modelled fault carries it away, so it may serve to locate the assembly.
+    pub datum: &'a [bool],
+    /// Digest of the resolved spec.
+    pub spec: String,
+}
+
+/// Steps of training, for whoever wants to show them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    Plan,
+    Render,
+    Fit,
+    HeldOut,
+    Verify,
+}
+
+/// Told about steps and, within them, units of work done of how many.
+pub type Observer<'a> = dyn Fn(Step, usize, usize) + Sync + 'a;
+
+/// Trains a model.
+pub fn train(job: &Job, observer: &Observer) -> Result<(Model, Vec<Diagnostic>), Vec<Diagnostic>> {
+    observer(Step::Plan, 0, 1);
+    let nominal = shots::nominal(job.design, job.station)?;
+    let plan = plan::plan(job.design, &job.camera, &nominal, job.modes);
+    let doubts = doubts(job, &plan);
+    let draws = Draws { seed: job.design.train.seed, count: job.design.train.images.max(2) };
+    let shots = render(job, &plan, &job.camera, draws, &|i, n| observer(Step::Render, i, n))?;
+    observer(Step::Fit, 0, 1);
+    let mut model = fit_model(job, &plan, &shots);
+    let held_out = held_out(job, &plan, &model, observer)?;
+    observer(Step::Verify, 0, 1);
+    verify::verify(&mut model, job.design, &plan, job.modes, &held_out);
+    Ok((model, doubts))
+}
+
+/// Components whose faults cannot be seen.
+fn doubts(job: &Job, plan: &Plan) -> Vec<Diagnostic> {
+    let blind = |&m: &usize| {
+        let mode = &job.modes[m];
+        let component = &job.design.components[mode.component];
+        let message = format!("station `{}` cannot tell when `{}` is {}", job.station.name, component.name, mode.kind.name());
+        Diagnostic::warning("W0602", component.span, message)
+            .label("nothing in the image changes")
+            .note("a go says nothing about this fault; another view may show it")
+    };
+    plan.unseen.iter().map(blind).collect()
+}
+
+/// Shots of all scenes of some draws by a camera.
+fn render(
+    job: &Job,
+    plan: &Plan,
+    camera: &Camera,
+    draws: Draws,
+    progress: &dyn Fn(usize, usize),
+) -> Result<Shots, Vec<Diagnostic>> {
+    let setup = Setup {
+        station: job.station,
+        camera: camera.reduced(plan.base),
+        lamps: build::lamps(job.station, camera),
+        samples: job.design.train.samples,
+        blur: job.station.camera.blur.nominal / f64::from(plan.base),
+    };
+    let total = draws.count as usize * (1 + plan.scenes.len());
+    let done = std::cell::Cell::new(0);
+    progress(0, total);
+    synthesise(job.design, &setup, plan, job.modes, draws, &|| {
+        done.set(done.get() + 1);
+        progress(done.get(), total);
+    })
+}
+
+fn fit_model(job: &Job, plan: &Plan, shots: &Shots) -> Model {
+    let lights = build::light_of_group(job.station);
+    let names = build::lamps(job.station, &job.camera);
+    let described: Vec<f64> = lights.iter().map(|&l| job.station.lights[l].power).collect();
+    let drift: Vec<f64> = lights.iter().map(|&l| job.station.lights[l].drift).collect();
+    let scale = exposure(plan, shots, &described);
+    let powers: Vec<f64> = described.iter().map(|p| p * scale).collect();
+    let lamp = |i: usize| Lamp { name: names[i].name.clone(), power: powers[i], drift: drift[i] };
+    let station = station(job, (0..powers.len()).map(lamp).collect());
+    let home = Pose::home(&station);
+    let context = Context {
+        design: job.design,
+        camera: &job.camera,
+        home,
+        plan,
+        modes: job.modes,
+        shots,
+        powers: &powers,
+        drift: &drift,
+    };
+    let nodes = plan.nodes.par_iter().filter_map(|node| fit::node(&context, node)).collect();
+    let unmeasured = Rate { events: 0, trials: 0, upper_95: 1.0 };
+    Model {
+        format: FORMAT,
+        writer: format!("gonogo {}", env!("CARGO_PKG_VERSION")),
+        assembly: job.design.name.clone(),
+        spec: job.spec.clone(),
+        seed: job.design.train.seed,
+        station,
+        promise: Promise {
+            false_reject_asked: job.design.inspect.false_reject,
+            false_reject: unmeasured,
+            escape: unmeasured,
+            modes: Vec::new(),
+        },
+        locator: fit::locator(&context, job.datum),
+        nodes,
+    }
+}
+
+/// The factor that brings bright surfaces of the assembly to a well exposed grey.
+fn exposure(plan: &Plan, shots: &Shots, described: &[f64]) -> f64 {
+    let lit = shots.good[0].lit(described);
+    // Standing apart from home by a little does no harm to a quantile.
+    let on_assembly = |i: usize| plan.good.id[i] != 0;
+    let bright = edges::quantile(&lit, on_assembly, EXPOSED_QUANTILE);
+    if bright > 0.0 { EXPOSED_TO / f64::from(bright) } else { 1.0 }
+}
+
+fn station(job: &Job, lamps: Vec<Lamp>) -> model::Station {
+    let spec = &job.station.camera;
+    let install = Install {
+        position_mm: spec.install_mm,
+        angle_rad: spec.install_rad,
+        focal_share: spec.focal.half_width() / spec.focal.nominal,
+        k1: [spec.k1.low, spec.k1.high],
+    };
+    let tone = match spec.response {
+        Response::Linear => Tone::Linear,
+        Response::Srgb => Tone::Srgb,
+    };
+    model::Station {
+        name: job.station.name.clone(),
+        camera: job.camera,
+        tone,
+        install,
+        standing: shots::standing(job.station),
+        noise: job.station.noise,
+        lamps,
+    }
+}
+
+/// Fresh shots for each imagined customer, by the camera as he has it.
+fn held_out(
+    job: &Job,
+    plan: &Plan,
+    model: &Model,
+    observer: &Observer,
+) -> Result<Vec<(verify::Customer, Shots)>, Vec<Diagnostic>> {
+    (0..CUSTOMERS)
+        .map(|index| {
+            let customer = verify::customer(model, index);
+            let camera = customer.installation.apply(&job.camera);
+            // Another seed than training's: these draws must be new.
+            let draws = Draws { seed: customer.seed, count: HELD_OUT_DRAWS };
+            let progress = |i: usize, n: usize| observer(Step::HeldOut, index as usize * n + i, CUSTOMERS as usize * n);
+            Ok((customer, render(job, plan, &camera, draws, &progress)?))
+        })
+        .collect()
+}

@@ -1,0 +1,235 @@
+//! What to render and where to look: the nodes of the object tree and the scenes that teach them.
+//!
+//! In: error modes, the nominal view. Out: a node per watched component whose errors show, with its frame and mask, and
+//! the error modes gathered into scenes. A node's mask is where the item buffer changes under any of its error modes,
+//! so what no fault of the component can touch has no say.
+
+use super::shots::Drawn;
+use crate::assembly::fault::ErrorMode;
+use crate::design::model::{Component, Design, Expr};
+use crate::runtime::camera::Camera;
+use crate::runtime::window::Frame;
+use crate::scene::build::bodies;
+use crate::view::item_buffer::{ItemBuffer, Mask, PixelBox};
+use crate::view::nodes::{change_mask, dilate};
+
+/// Places in a sweep at which the change of the image is looked at.
+const LOOKS: [f64; 3] = [0.05, 0.5, 0.95];
+/// A change is widened by this much (px of the shots): shadows, reflections and the sensor's point spread.
+const WIDEN: usize = 2;
+/// Fewer changed pixels than this (px of the shots) cannot be judged.
+const LEAST_PIXELS: usize = 8;
+/// A node has at most this many pixels; larger ones are taken at a coarser resolution.
+const MOST_NODE_PIXELS: u32 = 3000;
+/// A component disturbs a node when its own change covers this share of the node's.
+const DISTURBS: f64 = 0.3;
+/// Standard deviation of a node's shift when its placement is exact (px of the photo): what pose and camera leave.
+const POSE_RESIDUAL: f64 = 1.0;
+/// The smallest watched component should have this many px of the shots across.
+const SMALLEST_ACROSS: u32 = 8;
+/// Coarsest resolution of the shots.
+const COARSEST: u32 = 4;
+
+/// One node to be trained.
+pub struct NodePlan {
+    pub component: usize,
+    pub frame: Frame,
+    /// In node px.
+    pub mask: Vec<Vec<bool>>,
+    /// Box of the visible component in the nominal photo (px).
+    pub visible: [f64; 4],
+    /// Error modes that show here.
+    pub modes: Vec<usize>,
+    /// Where the image changes under any of them (px of the shots).
+    pub changed: Mask,
+    /// Standard deviation of the node's shift (px of the photo).
+    pub spread: f64,
+    /// Nodes whose image this one's faults disturb.
+    pub disturbs: Vec<u32>,
+}
+
+pub struct Plan {
+    /// px of the photo per px of the shots.
+    pub base: u32,
+    /// The nominal view at the resolution of the shots.
+    pub good: ItemBuffer,
+    pub nodes: Vec<NodePlan>,
+    /// Per faulty scene the modes shown in it: their changes do not meet.
+    pub scenes: Vec<Vec<usize>>,
+    /// Modes that change next to nothing in the image.
+    pub unseen: Vec<usize>,
+}
+
+/// Plans nodes and scenes for the watched components.
+pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, modes: &[ErrorMode]) -> Plan {
+    let base = resolution(design, camera, nominal);
+    let small = camera.reduced(base);
+    let view = View { drawn: nominal, camera: &small, good: seen(nominal, &[], &small) };
+    let watched = |component: usize| design.inspect.watch.iter().any(|w| w.component == component);
+    let mut changes: Vec<Option<Mask>> = Vec::new();
+    for mode in modes {
+        let changed = watched(mode.component).then(|| view.changed(mode));
+        changes.push(changed.filter(|mask| mask.count() >= LEAST_PIXELS));
+    }
+    let unseen = (0..modes.len()).filter(|&m| watched(modes[m].component) && changes[m].is_none()).collect();
+    let mut nodes: Vec<NodePlan> = (0..design.components.len())
+        .filter_map(|component| {
+            let own: Vec<usize> =
+                (0..modes.len()).filter(|&m| modes[m].component == component && changes[m].is_some()).collect();
+            node(design, camera, &view, base, component, own, &changes)
+        })
+        .collect();
+    link(&mut nodes);
+    let scenes = gather(modes, &changes);
+    Plan { base, good: view.good, nodes, scenes, unseen }
+}
+
+struct View<'a> {
+    drawn: &'a Drawn,
+    camera: &'a Camera,
+    good: ItemBuffer,
+}
+
+impl View<'_> {
+    /// Where the image changes under a mode, over its sweep.
+    fn changed(&self, mode: &ErrorMode) -> Mask {
+        let mut all = Mask {
+            width: self.good.width,
+            height: self.good.height,
+            bits: vec![false; self.good.width * self.good.height],
+        };
+        for u in LOOKS {
+            let faulty = seen(self.drawn, &[(mode, [u, 0.5, 0.5])], self.camera);
+            let change = change_mask(&self.good, &faulty);
+            all.bits.iter_mut().zip(change.bits).for_each(|(a, b)| *a |= b);
+        }
+        all
+    }
+}
+
+fn seen(drawn: &Drawn, faults: &[(&ErrorMode, [f64; 3])], camera: &Camera) -> ItemBuffer {
+    ItemBuffer::of(&bodies(&drawn.instance(faults), drawn.standing.to_array()), camera)
+}
+
+/// The resolution at which the smallest watched component still has enough pixels across.
+fn resolution(design: &Design, camera: &Camera, nominal: &Drawn) -> u32 {
+    let full = seen(nominal, &[], camera);
+    let across = |w: &crate::design::model::Watch| full.bbox(w.component).map(|b| (b.x1 - b.x0).min(b.y1 - b.y0));
+    let smallest = design.inspect.watch.iter().filter_map(across).filter(|&a| a >= SMALLEST_ACROSS).min();
+    let mut base = 1;
+    while base < COARSEST && smallest.is_some_and(|s| s / (base * 2) >= SMALLEST_ACROSS) {
+        base *= 2;
+    }
+    base
+}
+
+fn node(
+    design: &Design,
+    camera: &Camera,
+    view: &View,
+    base: u32,
+    component: usize,
+    modes: Vec<usize>,
+    changes: &[Option<Mask>],
+) -> Option<NodePlan> {
+    let mut changed = changes[*modes.first()?].clone()?;
+    for mask in modes.iter().filter_map(|&m| changes[m].as_ref()) {
+        changed.bits.iter_mut().zip(&mask.bits).for_each(|(a, b)| *a |= b);
+    }
+    let wide = dilate(&changed, WIDEN);
+    let area = wide.bbox()?;
+    let factor = factor(&area, base);
+    let (frame, mask) = framed(&wide, &area, base, factor, plane(view, component, &changed));
+    let shown = view.good.bbox(component).or_else(|| changed.bbox())?;
+    let visible = [shown.x0, shown.y0, shown.x1, shown.y1].map(|v| f64::from(v * base));
+    let spread = spread(&design.components[component], design, camera);
+    Some(NodePlan { component, frame, mask, visible, modes, changed, spread, disturbs: Vec::new() })
+}
+
+/// px of the photo per px of the node.
+fn factor(area: &PixelBox, base: u32) -> u32 {
+    let mut factor = base;
+    while (area.x1 - area.x0) * (area.y1 - area.y0) * base * base / (factor * factor) > MOST_NODE_PIXELS {
+        factor *= 2;
+    }
+    factor
+}
+
+/// Frame and mask in node px, from a mask in px of the shots. One node px of margin holds the Haar cells of the border.
+fn framed(wide: &Mask, area: &PixelBox, base: u32, factor: u32, plane: f64) -> (Frame, Vec<Vec<bool>>) {
+    const BORDER: u32 = 2;
+    let by = factor / base;
+    let low = [area.x0 / by, area.y0 / by];
+    let high = [area.x1.div_ceil(by), area.y1.div_ceil(by)];
+    let size = [0, 1].map(|i| high[i] - low[i] + 2 * BORDER);
+    let origin = [0, 1].map(|i| low[i] as i32 - BORDER as i32);
+    let set = |x: u32, y: u32| -> bool {
+        let Some((x, y)) = (x + low[0]).checked_sub(BORDER).zip((y + low[1]).checked_sub(BORDER)) else { return false };
+        (y * by..(y + 1) * by).any(|j| (x * by..(x + 1) * by).any(|i| bit(wide, i as usize, j as usize)))
+    };
+    let mask = (0..size[1]).map(|y| (0..size[0]).map(|x| set(x, y)).collect()).collect();
+    (Frame { plane, factor, origin, size }, mask)
+}
+
+fn bit(mask: &Mask, x: usize, y: usize) -> bool {
+    x < mask.width && y < mask.height && mask.bits[y * mask.width + x]
+}
+
+/// Height of the node's plane: the middle height of the component's visible surface, or of what shows in its place (mm,
+/// assembly frame).
+fn plane(view: &View, component: usize, changed: &Mask) -> f64 {
+    let heights = |mask: &Mask| -> Vec<f64> {
+        let pixels = (0..mask.bits.len()).filter(|&i| mask.bits[i]);
+        let point = |i: usize| view.good.point([i % mask.width, i / mask.width], view.camera);
+        pixels.filter_map(point).map(|p| view.drawn.standing.invert(p)[2]).collect()
+    };
+    let own = heights(&view.good.mask(component));
+    let mut all = if own.is_empty() { heights(changed) } else { own };
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Standard deviation of the component's place in the photo (px): its zone along x, y and z as seen, and what the pose leaves.
+fn spread(component: &Component, design: &Design, camera: &Camera) -> f64 {
+    let distance = camera.position.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let zone = |axis: &Expr| match axis {
+        Expr::Dim(id) => design.dims[id.0 as usize].range.half_width(),
+        _ => 0.0,
+    };
+    let per_mm = camera.focal / distance;
+    let variance: f64 = component.pose.t.iter().map(|axis| (zone(axis) * per_mm).powi(2) / 3.0).sum();
+    (variance + POSE_RESIDUAL * POSE_RESIDUAL).sqrt()
+}
+
+/// Notes which nodes lie where another's faults change the image.
+fn link(nodes: &mut [NodePlan]) {
+    let covers = |a: &NodePlan, b: &NodePlan| {
+        let common = a.changed.bits.iter().zip(&b.changed.bits).filter(|(a, b)| **a && **b).count();
+        common as f64 >= DISTURBS * b.changed.count() as f64
+    };
+    for i in 0..nodes.len() {
+        let disturbed = (0..nodes.len()).filter(|&j| j != i && covers(&nodes[i], &nodes[j]));
+        nodes[i].disturbs = disturbed.map(|j| j as u32).collect();
+    }
+}
+
+/// Puts every visible mode into the first scene in which no other change comes near.
+fn gather(modes: &[ErrorMode], changes: &[Option<Mask>]) -> Vec<Vec<usize>> {
+    let mut scenes: Vec<(Vec<usize>, Mask)> = Vec::new();
+    for (m, change) in changes.iter().enumerate() {
+        let Some(change) = change else { continue };
+        let wide = dilate(change, 2 * WIDEN);
+        let fits = |(taken, mask): &(Vec<usize>, Mask)| {
+            let apart = !mask.bits.iter().zip(&wide.bits).any(|(a, b)| *a && *b);
+            apart && taken.iter().all(|&t| modes[t].component != modes[m].component)
+        };
+        match scenes.iter_mut().find(|s| fits(s)) {
+            Some((taken, mask)) => {
+                taken.push(m);
+                mask.bits.iter_mut().zip(&wide.bits).for_each(|(a, b)| *a |= b);
+            }
+            None => scenes.push((vec![m], wide)),
+        }
+    }
+    scenes.into_iter().map(|(taken, _)| taken).collect()
+}

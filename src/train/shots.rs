@@ -1,0 +1,163 @@
+//! Synthetic photos, before any light level is chosen: one linear image per lamp.
+//!
+//! In: a design, a station, the number of a draw and the faults to show. Out: [`Shot`]s, all of one draw of dimensions,
+//! finishes and standing pose, so that a faulty shot differs from the good one by the fault alone.
+
+use crate::assembly::fault::{self, ErrorMode};
+use crate::assembly::place::place;
+use crate::design::model::{Design, Station};
+use crate::diag::Diagnostic;
+use crate::render::{self, Settings};
+use crate::rng::Stream;
+use crate::runtime::camera::Camera;
+use crate::runtime::grid::Grid;
+use crate::runtime::pose::Pose;
+use crate::scene::build::{self, FLOOR, Instance};
+use crate::scene::{Finish, Lamp};
+use crate::solid::{Quality, Solid, evaluate};
+use crate::variation;
+use nalgebra::Isometry3;
+use std::sync::Arc;
+
+/// Margin round the assembly's image (px of the shot).
+const MARGIN: f64 = 12.0;
+
+/// A draw of the assembly: pieces within tolerance, standing somewhere on the station.
+pub struct Drawn {
+    pub solids: Vec<Arc<Solid>>,
+    pub poses: Vec<Isometry3<f64>>,
+    pub finishes: Vec<Finish>,
+    pub ground: Option<Finish>,
+    pub standing: Pose,
+}
+
+/// The assembly at nominal, in the middle of its standing ranges.
+pub fn nominal(design: &Design, station: &Station) -> Result<Drawn, Vec<Diagnostic>> {
+    let values = design.nominal();
+    let finish = |m: usize| build::finish_nominal(&design.materials[m]);
+    Ok(Drawn {
+        solids: solids(design, &values)?,
+        poses: place(design, &values),
+        finishes: design.components.iter().map(|c| finish(design.parts[c.part].material)).collect(),
+        ground: station.floor.as_ref().map(|f| finish(f.material)),
+        standing: Pose::from_array(standing(station).map(|[low, high]| (low + high) / 2.0)),
+    })
+}
+
+/// Draw number `image` of the stream `seed`.
+pub fn draw(design: &Design, station: &Station, seed: u64, image: u64) -> Result<Drawn, Vec<Diagnostic>> {
+    let values = variation::draw(design, seed, image);
+    let finish = |component: usize, m: usize| build::finish(&design.materials[m], seed, image, component);
+    let mut stream = Stream::new(seed, "standing", image);
+    Ok(Drawn {
+        solids: solids(design, &values)?,
+        poses: place(design, &values),
+        finishes: design.components.iter().enumerate().map(|(i, c)| finish(i, design.parts[c.part].material)).collect(),
+        ground: station.floor.as_ref().map(|f| finish(FLOOR, f.material)),
+        standing: Pose::from_array(standing(station).map(|[low, high]| stream.between(low, high))),
+    })
+}
+
+/// Ranges of x, y, z (mm) and rz (rad) in which the assembly may stand.
+pub fn standing(station: &Station) -> [[f64; 2]; 4] {
+    [station.x, station.y, station.z, station.rz].map(|r| [r.low, r.high])
+}
+
+fn solids(design: &Design, values: &[f64]) -> Result<Vec<Arc<Solid>>, Vec<Diagnostic>> {
+    let quality = Quality::default();
+    // Components of one part share their solid; parts are few, so each is evaluated once.
+    let parts: Vec<Result<Arc<Solid>, Vec<Diagnostic>>> =
+        design.parts.iter().map(|part| evaluate(part, values, &quality).map(Arc::new)).collect();
+    design.components.iter().map(|c| parts[c.part].clone()).collect()
+}
+
+impl Drawn {
+    /// The instance with some error modes applied, each with its own place in its sweep.
+    pub fn instance(&self, faults: &[(&ErrorMode, [f64; 3])]) -> Instance {
+        let mut instance = Instance {
+            solids: self.solids.iter().cloned().map(Some).collect(),
+            poses: self.poses.clone(),
+            finishes: self.finishes.clone(),
+        };
+        for (mode, u) in faults {
+            match fault::apply(mode, *u, &self.solids, &self.poses).pose {
+                Some(pose) => instance.poses[mode.component] = pose,
+                None => instance.solids[mode.component] = None,
+            }
+        }
+        instance
+    }
+}
+
+/// One image per lamp, in the full frame of the reduced camera.
+pub struct Shot {
+    pub pose: Pose,
+    pub lamps: Vec<Grid>,
+}
+
+impl Shot {
+    /// The sum under the given lamp weights, unclipped.
+    pub fn lit(&self, weights: &[f64]) -> Grid {
+        let mut sum = Grid::filled(self.lamps[0].width, self.lamps[0].height, 0.0);
+        for (lamp, &weight) in self.lamps.iter().zip(weights) {
+            sum.values.iter_mut().zip(&lamp.values).for_each(|(s, v)| *s += v * weight as f32);
+        }
+        sum
+    }
+}
+
+/// How shots are taken.
+pub struct Setup<'a> {
+    pub station: &'a Station,
+    /// At the resolution of the shots.
+    pub camera: Camera,
+    pub lamps: Vec<Lamp>,
+    pub samples: u32,
+    /// Point spread in px of the shots.
+    pub blur: f64,
+}
+
+/// Takes a shot; `seed` keys the renderer's own randomness.
+pub fn take(setup: &Setup, drawn: &Drawn, instance: &Instance, seed: u64) -> Shot {
+    let standing = drawn.standing.to_array();
+    let scene = build::scene(setup.station, instance, standing, setup.lamps.clone(), drawn.ground.clone());
+    let crop = crop(&setup.camera, instance, &drawn.standing);
+    let settings = Settings { samples: setup.samples, seed, crop: Some(crop), ..Settings::default() };
+    let images = render::render(&scene, &setup.camera, &settings);
+    let [width, height] = images.size().map(|s| s as usize);
+    let grid = |mut values: Vec<f32>| {
+        render::sensor::blur(&mut values, width, height, setup.blur as f32);
+        framed(Grid::new(width, height, values), images.crop, setup.camera.size)
+    };
+    let pose = drawn.standing;
+    Shot { pose, lamps: images.groups.iter().cloned().map(grid).collect() }
+}
+
+/// Pixels that hold the image of the instance, with a margin.
+fn crop(camera: &Camera, instance: &Instance, standing: &Pose) -> [u32; 4] {
+    let mut hull = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    for (solid, pose) in instance.solids.iter().zip(&instance.poses) {
+        for point in solid.iter().flat_map(|s| &s.mesh.positions) {
+            let p = standing.apply((pose * point).coords.into());
+            if let Some([u, v]) = camera.project(p) {
+                hull = [hull[0].min(u), hull[1].min(v), hull[2].max(u), hull[3].max(v)];
+            }
+        }
+    }
+    let [width, height] = camera.size.map(f64::from);
+    let low = |v: f64, size: f64| (v - MARGIN).floor().clamp(0.0, size - 1.0) as u32;
+    let high = |v: f64, size: f64| (v + MARGIN).ceil().clamp(1.0, size) as u32;
+    let [x0, y0] = [low(hull[0], width), low(hull[1], height)];
+    [x0, y0, high(hull[2], width).max(x0 + 1), high(hull[3], height).max(y0 + 1)]
+}
+
+/// A crop in its full frame; outside, the border goes on, so that no edge appears that is none.
+fn framed(crop: Grid, [x0, y0, _, _]: [u32; 4], size: [u32; 2]) -> Grid {
+    let [width, height] = size.map(|s| s as usize);
+    let mut values = Vec::with_capacity(width * height);
+    for y in 0..height {
+        let row = y.saturating_sub(y0 as usize).min(crop.height - 1) * crop.width;
+        values.extend((0..width).map(|x| crop.values[row + x.saturating_sub(x0 as usize).min(crop.width - 1)]));
+    }
+    Grid::new(width, height, values)
+}

@@ -1,0 +1,62 @@
+//! The shots a model is made from: draws of the assembly, each correct and with every error mode.
+
+use super::plan::Plan;
+use super::shots::{self, Setup, Shot};
+use crate::assembly::fault::ErrorMode;
+use crate::design::model::Design;
+use crate::diag::Diagnostic;
+use crate::rng::Stream;
+
+/// All shots of a number of draws.
+pub struct Shots {
+    pub good: Vec<Shot>,
+    /// Per scene of the plan, per draw.
+    pub faulty: Vec<Vec<FaultyShot>>,
+}
+
+pub struct FaultyShot {
+    pub shot: Shot,
+    /// Per mode of the scene, its place in the sweep (0..1).
+    pub places: Vec<f64>,
+}
+
+/// Which draws: the seed of their streams and how many.
+#[derive(Debug, Clone, Copy)]
+pub struct Draws {
+    pub seed: u64,
+    pub count: u32,
+}
+
+/// Renders every draw in every scene, with `done` called after each shot.
+pub fn synthesise(
+    design: &Design,
+    setup: &Setup,
+    plan: &Plan,
+    modes: &[ErrorMode],
+    draws: Draws,
+    done: &dyn Fn(),
+) -> Result<Shots, Vec<Diagnostic>> {
+    let mut out = Shots { good: Vec::new(), faulty: plan.scenes.iter().map(|_| Vec::new()).collect() };
+    for image in 0..u64::from(draws.count) {
+        let drawn = shots::draw(design, setup.station, draws.seed, image)?;
+        let mut noise = Stream::new(draws.seed, "render", image);
+        out.good.push(shots::take(setup, &drawn, &drawn.instance(&[]), noise.bits()));
+        done();
+        for (scene, taken) in plan.scenes.iter().zip(&mut out.faulty) {
+            let sizes: Vec<[f64; 3]> = scene.iter().map(|&m| place_in_sweep(draws.seed, m, image)).collect();
+            let faults: Vec<_> = scene.iter().map(|&m| &modes[m]).zip(sizes.iter().copied()).collect();
+            let shot = shots::take(setup, &drawn, &drawn.instance(&faults), noise.bits());
+            taken.push(FaultyShot { shot, places: sizes.iter().map(|u| u[0]).collect() });
+            done();
+        }
+    }
+    Ok(out)
+}
+
+/// Places in a mode's sweep, spread evenly over the draws by the golden ratio (additive recurrence).
+fn place_in_sweep(seed: u64, mode: usize, image: u64) -> [f64; 3] {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let start = Stream::new(seed, "sweep", mode as u64).uniform();
+    let mut stream = Stream::new(seed, "fault", (mode as u64) << 32 | image);
+    [(start + GOLDEN * image as f64).fract(), stream.uniform(), stream.uniform()]
+}

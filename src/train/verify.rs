@@ -1,0 +1,161 @@
+//! Both error rates, measured with the whole detector on renders it was not trained on.
+//!
+//! In: a trained model, fresh shots. Out: thresholds, scores and the promise that the model file makes. The station is
+//! imagined installed with an error, lit by lamps of other powers, and calibrated with one photo, as a customer would.
+
+use super::plan::Plan;
+use super::stats::{rate, rounded};
+use super::synthesise::{FaultyShot, Shots};
+use crate::assembly::fault::ErrorMode;
+use crate::design::model::Design;
+use crate::rng::Stream;
+use crate::runtime::calibrate::{self, Calibration};
+use crate::runtime::grid::Grid;
+use crate::runtime::inspect::{Inspector, Verdict};
+use crate::runtime::model::{ModeRate, Model, Promise};
+use crate::runtime::photo::Photo;
+use crate::runtime::pose::Installation;
+
+/// Lamps of a customer's station give between these shares of the described power.
+const LAMP_POWERS: [f64; 2] = [0.3, 1.7];
+/// Grey value (share of full scale) that bright matt surfaces reach in a well exposed photo: least and most.
+const EXPOSURES: [f64; 2] = [0.35, 0.75];
+/// Share of the held-out goods' lowest locator score below which an assembly counts as not found.
+const ACCEPT_SHARE: f64 = 0.5;
+
+/// A station as some customer might have it.
+pub struct Customer {
+    pub installation: Installation,
+    pub powers: Vec<f64>,
+    pub noise: f64,
+    pub seed: u64,
+}
+
+/// Customer number `index`.
+pub fn customer(model: &Model, index: u64) -> Customer {
+    let mut stream = Stream::new(model.seed, "customer", index);
+    let install = &model.station.install;
+    let mut within = |half: f64| stream.between(-half, half);
+    let offset = [(); 3].map(|()| within(install.position_mm));
+    let turn = [(); 3].map(|()| within(install.angle_rad));
+    let focal = within(install.focal_share);
+    let k1 = within((install.k1[1] - install.k1[0]) / 2.0);
+    let exposure = stream.between(EXPOSURES[0], EXPOSURES[1]) / 0.6;
+    let powers = model.station.lamps.iter().map(|l| l.power * exposure * stream.between(LAMP_POWERS[0], LAMP_POWERS[1]));
+    let powers = powers.collect();
+    let installation = Installation { offset, turn, focal, k1 };
+    Customer { installation, powers, noise: model.station.noise.max(0.002), seed: stream.bits() }
+}
+
+/// A photo: lamps drift, the sensor adds its noise, clips and rounds to 8 bits.
+pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, index: u64) -> Photo {
+    let mut stream = Stream::new(customer.seed, "photo", index);
+    let drifted: Vec<f64> = customer
+        .powers
+        .iter()
+        .zip(&model.station.lamps)
+        .map(|(p, lamp)| (p * (1.0 + stream.between(-lamp.drift, lamp.drift))).max(0.0))
+        .collect();
+    let mut light = Grid::filled(lamps[0].width, lamps[0].height, 0.0);
+    for (lamp, &weight) in lamps.iter().zip(&drifted) {
+        light.values.iter_mut().zip(&lamp.values).for_each(|(s, v)| *s += v * weight as f32);
+    }
+    let [width, height] = model.station.camera.size.map(|s| s as usize);
+    let mut values = Vec::with_capacity(width * height);
+    for y in 0..height {
+        let row = (y / base as usize).min(light.height - 1) * light.width;
+        for x in 0..width {
+            let v = f64::from(light.values[row + (x / base as usize).min(light.width - 1)]);
+            let noisy = (v + customer.noise * stream.normal()).clamp(0.0, 1.0);
+            values.push(((noisy * 255.0).round() / 255.0) as f32);
+        }
+    }
+    Photo::from_light(Grid::new(width, height, values))
+}
+
+/// One customer's photos, judged.
+struct Judged {
+    good: Vec<Verdict>,
+    /// Per scene, per draw.
+    faulty: Vec<Vec<Verdict>>,
+}
+
+/// Judges the held-out shots of each customer and writes thresholds and promise into the model. The first good shot of
+/// each customer calibrates.
+pub fn verify(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], held_out: &[(Customer, Shots)]) {
+    let judged: Vec<Judged> = held_out.iter().filter_map(|(c, shots)| judge(model, plan, c, shots)).collect();
+    let unfit = held_out.len() - judged.len();
+    scores(model, design, plan, modes, &judged);
+    model.locator.accept = accept(&judged);
+    model.promise = promise(model, design, plan, modes, &judged, unfit);
+}
+
+fn judge(model: &Model, plan: &Plan, customer: &Customer, shots: &Shots) -> Option<Judged> {
+    let take = |lamps: &[Grid], index: u64| photo(model, customer, lamps, plan.base, index);
+    let (first, rest) = shots.good.split_first()?;
+    let calibration: Calibration = calibrate::fit(model, &[take(&first.lamps, 0)]).ok()?;
+    let inspector = Inspector::new(model, &calibration)?;
+    let good = rest.iter().enumerate().map(|(i, s)| inspector.inspect(&take(&s.lamps, 1 + i as u64))).collect();
+    let scene = |(scene, taken): (usize, &Vec<FaultyShot>)| {
+        let index = |i: usize| ((scene as u64 + 1) << 20) + i as u64;
+        taken.iter().enumerate().map(|(i, f)| inspector.inspect(&take(&f.shot.lamps, index(i)))).collect()
+    };
+    Some(Judged { good, faulty: shots.faulty.iter().enumerate().map(scene).collect() })
+}
+
+/// Scores of every node on goods and on its own faults.
+fn scores(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], judged: &[Judged]) {
+    for (index, node) in model.nodes.iter_mut().enumerate() {
+        let of = |verdict: &Verdict| verdict.nodes.get(index).map(|n| rounded(n.score));
+        let mut good: Vec<f64> = judged.iter().flat_map(|j| &j.good).filter_map(of).collect();
+        let own = |m: &usize| design.components[modes[*m].component].name == node.name;
+        let shown = |scene: &Vec<usize>| scene.iter().any(own);
+        let faulty = judged.iter().flat_map(|j| j.faulty.iter().zip(&plan.scenes));
+        let mut fault: Vec<f64> =
+            faulty.filter(|(_, scene)| shown(scene)).flat_map(|(verdicts, _)| verdicts).filter_map(of).collect();
+        good.sort_by(f64::total_cmp);
+        fault.sort_by(f64::total_cmp);
+        node.good_scores = good;
+        node.fault_scores = fault;
+    }
+}
+
+fn accept(judged: &[Judged]) -> f64 {
+    let lowest = judged.iter().flat_map(|j| &j.good).map(|v| v.locator_score).fold(f64::INFINITY, f64::min);
+    if lowest.is_finite() { rounded((lowest * ACCEPT_SHARE).max(0.0)) } else { 0.0 }
+}
+
+fn promise(
+    model: &Model,
+    design: &Design,
+    plan: &Plan,
+    modes: &[ErrorMode],
+    judged: &[Judged],
+    unfit: usize,
+) -> Promise {
+    let rejected = |v: &&Verdict| v.nodes.is_empty() || v.nodes.iter().any(|n| n.faulty);
+    let goods: Vec<&Verdict> = judged.iter().flat_map(|j| &j.good).collect();
+    let false_rejects = goods.iter().filter(|v| rejected(v)).count() + unfit;
+    let mut rates = Vec::new();
+    let (mut escapes, mut trials) = (0, 0);
+    for (scene, shown) in plan.scenes.iter().enumerate() {
+        for &m in shown {
+            let component = &design.components[modes[m].component].name;
+            let Some(node) = model.nodes.iter().position(|n| &n.name == component) else { continue };
+            let verdicts: Vec<&Verdict> = judged.iter().flat_map(|j| &j.faulty[scene]).collect();
+            // A photo in which the assembly is not found is not passed: it does not escape.
+            let passed = |v: &&&Verdict| v.nodes.get(node).is_some_and(|n| !n.faulty);
+            let escaped = verdicts.iter().filter(passed).count() as u32;
+            escapes += escaped;
+            trials += verdicts.len() as u32;
+            let escape = rate(escaped, verdicts.len() as u32);
+            rates.push(ModeRate { component: component.clone(), fault: modes[m].kind.name().into(), escape });
+        }
+    }
+    Promise {
+        false_reject_asked: design.inspect.false_reject,
+        false_reject: rate(false_rejects as u32, (goods.len() + unfit) as u32),
+        escape: rate(escapes, trials),
+        modes: rates,
+    }
+}
