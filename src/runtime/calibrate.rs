@@ -209,3 +209,22 @@ pub fn noise_of(light: &Grid) -> f64 {
     }
     2.0 * f64::from(linear::median(&mut diagonal)) / 0.6745
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_measured_beside_strong_edges() {
+        let mut state = 9u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / (1u64 << 24) as f32
+        };
+        let mut normal = || (0..12).map(|_| uniform()).sum::<f32>() - 6.0;
+        let bars = |i: usize| if (i / 16) % 2 == 0 { 0.2 } else { 0.7 };
+        let light = Grid::new(128, 128, (0..128 * 128).map(|i| bars(i % 128) + 0.02 * normal()).collect());
+        let sigma = noise_of(&light);
+        assert!((sigma / 0.02 - 1.0).abs() < 0.06, "{sigma}");
+    }
+}

@@ -224,3 +224,76 @@ fn principal(residuals: &[Vec<f32>], variance: &[f32]) -> (Vec<Vec<f32>>, Vec<Ve
     }
     (columns, rests)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A few numbers without structure.
+    fn noise(n: usize, seed: u64) -> Vec<f32> {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / (1u64 << 24) as f32 - 0.5
+        };
+        (0..n).map(|_| next() + next() + next() + next()).collect()
+    }
+
+    fn one_level(n: usize) -> Floor {
+        Floor { levels: std::iter::once(0..n).collect(), noise: 0.01, rms: vec![0.1] }
+    }
+
+    #[test]
+    fn gaussian_equals_the_density_of_the_full_covariance() {
+        let n = 7;
+        let samples: Vec<Vec<f32>> = (0..9).map(|i| noise(n, i)).collect();
+        let density = Density::fit(&samples, vec![noise(n, 100)], &one_level(n));
+        let mut covariance = vec![0.0; n * n];
+        for i in 0..n {
+            covariance[i * n + i] = 1.0 / f64::from(density.precision[i]);
+            for j in 0..n {
+                for w in &density.columns {
+                    covariance[i * n + j] += f64::from(w[i]) * f64::from(w[j]);
+                }
+            }
+        }
+        let z = noise(n, 55);
+        let r: Vec<f64> = z.iter().zip(&density.mean).map(|(z, m)| f64::from(z - m)).collect();
+        let l = linear::cholesky(&covariance, n).unwrap();
+        let x = linear::solve_with(&l, &r);
+        let square: f64 = x.iter().zip(&r).map(|(a, b)| a * b).sum();
+        let log_det: f64 = (0..n).map(|i| l[i * n + i].ln() * 2.0).sum();
+        let expected = -(square + log_det) / 2.0;
+        assert!((density.gaussian(&z) - expected).abs() < 1e-4 * expected.abs(), "{} {expected}", density.gaussian(&z));
+    }
+
+    #[test]
+    fn a_direction_forgives_what_varies_together_and_nothing_else() {
+        let n = 40;
+        let pattern = noise(n, 3);
+        let base = noise(n, 4);
+        let with = |gain: f32, seed| -> Vec<f32> {
+            noise(n, seed).iter().zip(&pattern).zip(&base).map(|((e, p), b)| b + gain * p + 0.05 * e).collect()
+        };
+        let gains = [-2.0, -1.2, -0.6, -0.1, 0.3, 0.8, 1.3, 1.9];
+        let samples: Vec<Vec<f32>> = gains.iter().enumerate().map(|(i, &g)| with(g, 10 + i as u64)).collect();
+        let density = Density::fit(&samples, Vec::new(), &one_level(n));
+        let other = noise(n, 5);
+        let strange: Vec<f32> = with(0.0, 30).iter().zip(&other).map(|(z, o)| z + o).collect();
+        let usual = density.student(&with(1.6, 31));
+        assert!(usual > density.student(&with(0.0, 32)) - 0.2 * n as f64);
+        assert!(usual > density.student(&strange) + 0.5 * n as f64);
+    }
+
+    #[test]
+    fn one_wild_coefficient_costs_a_student_little() {
+        let n = 40;
+        let samples: Vec<Vec<f32>> = (0..9).map(|i| noise(n, i)).collect();
+        let density = Density::fit(&samples, Vec::new(), &one_level(n));
+        let mut z = noise(n, 77);
+        let (gaussian, student) = (density.gaussian(&z), density.student(&z));
+        z[3] += 20.0;
+        assert!(gaussian - density.gaussian(&z) > 100.0);
+        assert!(student - density.student(&z) < 25.0);
+    }
+}

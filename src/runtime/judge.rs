@@ -307,3 +307,24 @@ impl Prepared {
         self.nodes.iter().zip(hypotheses).map(of).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lamp_weights_come_back_in_spite_of_outliers() {
+        let value = |k: usize, lamp: usize| ((k * (7 + 3 * lamp) + lamp) as f32 * 0.7).sin();
+        let lamps: Vec<Vec<f32>> = (0..3).map(|lamp| (0..400).map(|k| value(k, lamp)).collect()).collect();
+        let truth = [0.8, 0.0, 2.5];
+        let mut z: Vec<f32> = (0..400).map(|k| (0..3).map(|l| lamps[l][k] * truth[l] as f32).sum()).collect();
+        for wild in z.iter_mut().step_by(10) {
+            *wild += 30.0;
+        }
+        let clipped = vec![false; z.len()];
+        let fit = fit_lamps(&[LightEvidence { z, clipped, lamps }], &[1.0, 1.0, 1.0], 1e-4);
+        for (weight, truth) in fit.weights.iter().zip(truth) {
+            assert!((weight - truth).abs() < 0.05, "{:?}", fit.weights);
+        }
+    }
+}
