@@ -2,6 +2,8 @@
 //!
 //! In: placed solids with sampled materials, a station. Out: [`Scene`] in the station's frame (mm). Never traces a ray.
 
+pub mod build;
+
 use crate::design::model::MaterialKind;
 use crate::solid::TriMesh;
 use nalgebra::{Isometry3, Point3};

@@ -1,0 +1,415 @@
+//! The camera: the paper's criterion over the places the spec allows (its §IV), and the components no camera sees.
+//!
+//! In: a design, one of its stations, the bodies as they stand, the faces of the error trees. Out: a [`Choice`] with the
+//! score of every view tried, and diagnostics. Never renders light: a view is an item buffer.
+//!
+//! The paper maximises "the number of visible pixels and surfaces" and leaves their exchange rate open. Here a surface
+//! seen in p pixels is worth ln(1 + p / 16) of its weight: the first pixels of another surface count most, more of the
+//! same surface always helps. Before the score come two demands: all that is watched stays inside the image wherever the
+//! assembly may stand, and as many of the watched components as possible are seen at all.
+
+use super::item_buffer::{ItemBuffer, PixelGrid};
+use super::nodes::{Seen, seen};
+use crate::design::model::{CameraPlacing, Design, Station};
+use crate::diag::Diagnostic;
+use crate::runtime::camera::Camera;
+use crate::scene::Body;
+use crate::scene::build::{self, Placed};
+use crate::units::Range;
+use nalgebra::Point3;
+use rayon::prelude::*;
+use std::cmp::Ordering;
+use std::f64::consts::TAU;
+
+/// A component or surface seen in fewer pixels than this is not seen: a 4 × 4 px patch is the least a gradient fits in.
+pub const LEAST_PIXELS: u32 = 16;
+/// Width (px) the views of the search are reduced to.
+const SEARCH_WIDTH: u32 = 160;
+/// Views along distance, elevation and azimuth in the coarse grid: 252 in all.
+const COARSE: [u32; 3] = [3, 7, 12];
+/// Rounds of refinement, each with half the step of the one before.
+const ROUNDS: u32 = 3;
+
+/// A face whose visible pixels count.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Target {
+    pub component: usize,
+    /// Face of the component's solid.
+    pub face: u32,
+    pub weight: f64,
+}
+
+/// One view and what it is worth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scored {
+    pub placing: Placed,
+    /// All that is watched is inside the image wherever the assembly may stand.
+    pub framed: bool,
+    /// Visible pixels (of the full image, estimated at reduced size) of each watched component.
+    pub watched: Vec<u32>,
+    /// Targets seen in at least [`LEAST_PIXELS`], and visible pixels of all targets.
+    pub surfaces: u32,
+    pub pixels: u32,
+    pub score: f64,
+}
+
+/// The chosen view among all that were tried.
+#[derive(Debug, Clone)]
+pub struct Choice {
+    /// Index into `table`.
+    pub best: usize,
+    /// Every view tried, in the order of trying: the coarse grid, then the refinements.
+    pub table: Vec<Scored>,
+    /// The nominal camera of the chosen view.
+    pub camera: Camera,
+    /// What it sees, at full size.
+    pub seen: Vec<Seen>,
+    /// E0601 for every watched component it does not see.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Chooses the station's camera; a fixed one is scored and checked as a choice of one.
+pub fn choose(design: &Design, station: &Station, bodies: &[Body], targets: &[Target]) -> Choice {
+    let search = Search::new(design, station, bodies, targets);
+    let table = match &station.camera.placing {
+        &CameraPlacing::Fixed { distance, elevation, azimuth } => {
+            search.score_all(&[Placed { distance, elevation, azimuth }])
+        }
+        CameraPlacing::Auto { distance, elevation, azimuth } => search.run([distance, elevation, azimuth]),
+    };
+    let best = best(&table);
+    let camera = build::camera(&station.camera, table[best].placing);
+    let seen = seen(bodies, &camera, &ItemBuffer::of(bodies, &camera));
+    let diagnostics = unseen(design, station, &table, &seen);
+    Choice { best, table, camera, seen, diagnostics }
+}
+
+struct Search<'a> {
+    station: &'a Station,
+    bodies: &'a [Body],
+    targets: &'a [Target],
+    watched: Vec<usize>,
+    /// Corners of the boxes of all that is watched, at every extreme of where the assembly may stand (mm).
+    extremes: Vec<Point3<f64>>,
+    /// Image size is divided by this during the search.
+    reduction: u32,
+    grid: PixelGrid,
+}
+
+impl<'a> Search<'a> {
+    fn new(design: &Design, station: &'a Station, bodies: &'a [Body], targets: &'a [Target]) -> Self {
+        let watched: Vec<usize> = design.inspect.watch.iter().map(|w| w.component).collect();
+        let reduction = (station.camera.image[0] / SEARCH_WIDTH).max(1);
+        let anywhere = Placed { distance: 1.0, elevation: 0.0, azimuth: 0.0 };
+        let grid = PixelGrid::of(&build::camera(&station.camera, anywhere).reduced(reduction));
+        let extremes = extremes(station, bodies.iter().filter(|body| watched.contains(&body.component)));
+        Search { station, bodies, targets, watched, extremes, reduction, grid }
+    }
+
+    /// A coarse grid over the ranges, then ever finer steps round the best.
+    fn run(&self, ranges: [&Range; 3]) -> Vec<Scored> {
+        let axes = [0, 1, 2].map(|i| Axis::new(ranges[i], COARSE[i], i == 2));
+        let mut table = self.score_all(&product(axes.each_ref().map(Axis::coarse)));
+        for round in 1..=ROUNDS {
+            let Placed { distance, elevation, azimuth } = table[best(&table)].placing;
+            let centre = [distance, elevation, azimuth];
+            let near = [0, 1, 2].map(|i| axes[i].near(centre[i], 0.5f64.powi(round as i32)));
+            let tried = |placing: &Placed| table.iter().any(|scored| scored.placing == *placing);
+            let fresh: Vec<Placed> = product(near).into_iter().filter(|placing| !tried(placing)).collect();
+            table.extend(self.score_all(&fresh));
+        }
+        table
+    }
+
+    /// Scores in the order of the places, at any number of threads.
+    fn score_all(&self, places: &[Placed]) -> Vec<Scored> {
+        places.par_iter().map(|&placing| self.score(placing)).collect()
+    }
+
+    fn score(&self, placing: Placed) -> Scored {
+        let camera = build::camera(&self.station.camera, placing);
+        let buffer = ItemBuffer::on_grid(self.bodies, &camera.reduced(self.reduction), &self.grid);
+        let counts = buffer.counts();
+        let area = self.reduction * self.reduction;
+        let of_target = |t: &Target| area * counts.get(&(t.component, t.face)).copied().unwrap_or(0);
+        let worth = |t: &Target| t.weight * (f64::from(of_target(t)) / f64::from(LEAST_PIXELS)).ln_1p();
+        Scored {
+            placing,
+            framed: self.extremes.iter().all(|p| inside(&camera, p)),
+            watched: self.watched.iter().map(|&component| area * buffer.pixels(component)).collect(),
+            surfaces: self.targets.iter().filter(|t| of_target(t) >= LEAST_PIXELS).count() as u32,
+            pixels: self.targets.iter().map(of_target).sum(),
+            score: self.targets.iter().map(worth).sum(),
+        }
+    }
+}
+
+/// One axis of the search.
+struct Axis {
+    low: f64,
+    high: f64,
+    steps: u32,
+    /// A whole turn: its ends are the same view.
+    around: bool,
+}
+
+impl Axis {
+    fn new(range: &Range, steps: u32, is_azimuth: bool) -> Axis {
+        let around = is_azimuth && range.high - range.low > TAU - 1e-9;
+        Axis { low: range.low, high: range.high, steps: if range.high > range.low { steps } else { 1 }, around }
+    }
+
+    fn step(&self) -> f64 {
+        let gaps = if self.around { self.steps } else { self.steps.saturating_sub(1).max(1) };
+        (self.high - self.low) / f64::from(gaps)
+    }
+
+    fn coarse(&self) -> Vec<f64> {
+        (0..self.steps).map(|i| (self.low + f64::from(i) * self.step()).min(self.high)).collect()
+    }
+
+    /// The centre and its neighbours at `share` of the coarse step, inside the range.
+    fn near(&self, centre: f64, share: f64) -> Vec<f64> {
+        let step = self.step() * share;
+        let mut values: Vec<f64> = [-step, 0.0, step].into_iter().map(|d| self.clamp(centre + d)).collect();
+        values.dedup();
+        values
+    }
+
+    fn clamp(&self, value: f64) -> f64 {
+        if self.around { value } else { value.clamp(self.low, self.high) }
+    }
+}
+
+fn product([distances, elevations, azimuths]: [Vec<f64>; 3]) -> Vec<Placed> {
+    let mut places = Vec::with_capacity(distances.len() * elevations.len() * azimuths.len());
+    for &distance in &distances {
+        for &elevation in &elevations {
+            places.extend(azimuths.iter().map(|&azimuth| Placed { distance, elevation, azimuth }));
+        }
+    }
+    places
+}
+
+/// Index of the best view; the first of equals.
+fn best(table: &[Scored]) -> usize {
+    (1..table.len()).fold(0, |best, i| if compare(&table[i], &table[best]).is_gt() { i } else { best })
+}
+
+fn compare(a: &Scored, b: &Scored) -> Ordering {
+    let seen = |s: &Scored| s.watched.iter().filter(|&&pixels| pixels >= LEAST_PIXELS).count();
+    a.framed.cmp(&b.framed).then(seen(a).cmp(&seen(b))).then(a.score.total_cmp(&b.score))
+}
+
+fn extremes<'a>(station: &Station, bodies: impl Iterator<Item = &'a Body>) -> Vec<Point3<f64>> {
+    let corners: Vec<Point3<f64>> = bodies.flat_map(box_corners).collect();
+    let off = |range: &Range| [range.low - range.nominal, range.high - range.nominal];
+    let mut points = Vec::with_capacity(8 * corners.len());
+    for x in off(&station.x) {
+        for y in off(&station.y) {
+            for turn in off(&station.rz) {
+                let moved = build::stand([x, y, 0.0, turn]);
+                points.extend(corners.iter().map(|p| moved * p));
+            }
+        }
+    }
+    points
+}
+
+/// Corners of the box round a body, along the axes of its part, in the station's frame.
+fn box_corners(body: &Body) -> Vec<Point3<f64>> {
+    let Some(&first) = body.mesh.positions.first() else { return Vec::new() };
+    let (low, high) = body.mesh.positions.iter().fold((first, first), |(l, h), p| (l.inf(p), h.sup(p)));
+    let pick = |i: usize, axis: usize| if i >> axis & 1 == 1 { high[axis] } else { low[axis] };
+    (0..8).map(|i| body.pose * Point3::new(pick(i, 0), pick(i, 1), pick(i, 2))).collect()
+}
+
+fn inside(camera: &Camera, p: &Point3<f64>) -> bool {
+    let [width, height] = camera.size.map(f64::from);
+    camera.project((*p).into()).is_some_and(|[x, y]| (0.0..=width).contains(&x) && (0.0..=height).contains(&y))
+}
+
+/// E0601: a watched component that the chosen camera, at full size, does not see.
+fn unseen(design: &Design, station: &Station, table: &[Scored], seen: &[Seen]) -> Vec<Diagnostic> {
+    let watch = design.inspect.watch.iter().enumerate();
+    let hidden = watch.filter_map(|(i, watch)| {
+        let found = seen.iter().find(|s| s.component == watch.component)?;
+        (found.visible_pixels < LEAST_PIXELS).then_some((i, found))
+    });
+    hidden.map(|(i, found)| report(design, station, table, (i, found))).collect()
+}
+
+fn report(design: &Design, station: &Station, table: &[Scored], (watch, found): (usize, &Seen)) -> Diagnostic {
+    let component = &design.components[found.component];
+    let (name, visible, full) = (&component.name, found.visible_pixels, found.full_pixels);
+    let is_auto = matches!(station.camera.placing, CameraPlacing::Auto { .. });
+    let most = table.iter().max_by_key(|scored| scored.watched[watch]);
+    let elsewhere = most.filter(|scored| scored.watched[watch] >= LEAST_PIXELS);
+    let subject = match (is_auto, elsewhere) {
+        (true, None) => format!("no allowed camera of station `{}` sees", station.name),
+        (true, Some(_)) => format!("the camera chosen for station `{}` does not see", station.name),
+        (false, _) => format!("the camera of station `{}` does not see", station.name),
+    };
+    let message = format!("{subject} component `{name}`: {visible} of {full} px");
+    let mut fault = Diagnostic::error("E0601", station.camera.span, message)
+        .label(format!("sees {visible} px of it; at least {LEAST_PIXELS} are needed"))
+        .also(component.span, if full == 0 { "outside the image" } else { "hidden behind other components" });
+    if let (true, Some(view)) = (is_auto, elsewhere) {
+        fault = fault.note(format!("{}, a view that loses more than it gains", describe(view, watch)));
+    }
+    fault
+}
+
+fn describe(view: &Scored, watch: usize) -> String {
+    let Placed { distance, elevation, azimuth } = view.placing;
+    let [elevation, azimuth] = [elevation, azimuth].map(f64::to_degrees);
+    format!(
+        "{} px are seen from {distance:.0} mm, {elevation:.0} deg up, azimuth {azimuth:.0} deg",
+        view.watched[watch]
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::shapes::{block, body, placed};
+    use super::*;
+    use crate::design::model::{CameraSpec, Component, Inspect, PoseExpr, Response, Train, Watch};
+    use crate::diag::Span;
+
+    fn station(placing: CameraPlacing) -> Station {
+        let camera = CameraSpec {
+            image: [640, 480],
+            focal: Range::exactly(16.0),
+            pitch: 0.0074,
+            aim: [0.0, 0.0, 10.0],
+            placing,
+            k1: Range { low: -0.05, nominal: -0.02, high: 0.0 },
+            install_mm: 0.0,
+            install_rad: 0.0,
+            blur: Range::exactly(0.5),
+            response: Response::Linear,
+            span: Span::default(),
+        };
+        Station {
+            name: "S".into(),
+            camera,
+            lights: Vec::new(),
+            floor: None,
+            x: Range::symmetric(0.0, 3.0),
+            y: Range::symmetric(0.0, 3.0),
+            z: Range::exactly(0.0),
+            rz: Range::symmetric(0.0, 0.1),
+            exposure: Range::exactly(1.0),
+            noise: 0.0,
+            span: Span::default(),
+        }
+    }
+
+    fn design(components: usize, watch: &[usize]) -> Design {
+        let component = |i: usize| Component {
+            name: format!("part[{}]", i + 1),
+            part: i,
+            parent: i.checked_sub(1).map(|_| 0),
+            frame: PoseExpr::identity(),
+            pose: PoseExpr::identity(),
+            free: [false; 6],
+            span: Span::default(),
+        };
+        Design {
+            name: "test".into(),
+            dims: Vec::new(),
+            materials: Vec::new(),
+            parts: Vec::new(),
+            components: (0..components).map(component).collect(),
+            stations: Vec::new(),
+            inspect: Inspect {
+                watch: watch.iter().map(|&component| Watch { component, depth: None }).collect(),
+                false_reject: 0.01,
+                span: Span::default(),
+            },
+            train: Train { images: 1, seed: 1, levels: 1, samples: 1, uniform: true },
+        }
+    }
+
+    fn anywhere() -> CameraPlacing {
+        let degrees = |low: f64, high: f64| Range { low: low.to_radians(), nominal: 0.0, high: high.to_radians() };
+        let distance = Range { low: 300.0, nominal: 350.0, high: 400.0 };
+        CameraPlacing::Auto { distance, elevation: degrees(20.0, 90.0), azimuth: degrees(-180.0, 180.0) }
+    }
+
+    fn overhead_fixed() -> CameraPlacing {
+        CameraPlacing::Fixed { distance: 350.0, elevation: 90f64.to_radians(), azimuth: 0.0 }
+    }
+
+    /// A table with a niche: a small block that a wall hides from everywhere but +y and above.
+    fn niche() -> Vec<Body> {
+        vec![
+            body(0, block([50.0, 50.0, 4.0]), placed(0.0, 0.0, 0.0)),
+            body(1, block([50.0, 4.0, 40.0]), placed(0.0, -10.0, 4.0)),
+            body(2, block([10.0, 10.0, 10.0]), placed(0.0, 0.0, 4.0)),
+        ]
+    }
+
+    #[test]
+    fn the_search_finds_the_side_the_watched_face_is_on() {
+        let targets = [Target { component: 2, face: 4, weight: 1.0 }];
+        let choice = choose(&design(3, &[2]), &station(anywhere()), &niche(), &targets);
+        let placing = choice.table[choice.best].placing;
+        assert!(choice.diagnostics.is_empty());
+        assert!((placing.azimuth - 90f64.to_radians()).abs() < 20f64.to_radians(), "{placing:?}");
+        assert!(placing.elevation < 40f64.to_radians());
+        assert!(choice.table.len() > 252);
+        let found = choice.seen.iter().find(|s| s.component == 2).unwrap();
+        let face = found.faces.iter().find(|f| f.0 == 4).unwrap().1;
+        let estimate = choice.table[choice.best].pixels;
+        assert!(face.abs_diff(estimate) < face / 10, "{face} {estimate}");
+    }
+
+    #[test]
+    fn the_assembly_stays_in_the_image_wherever_it_stands() {
+        let targets = [Target { component: 0, face: 1, weight: 1.0 }];
+        let mut station = station(anywhere());
+        let all = choose(&design(3, &[0]), &station, &niche(), &targets);
+        assert!(all.table[all.best].framed);
+        station.x = Range::symmetric(0.0, 300.0);
+        let none = choose(&design(3, &[0]), &station, &niche(), &targets);
+        assert!(!none.table[none.best].framed);
+    }
+
+    #[test]
+    fn a_component_no_view_shows_is_an_error_in_names_and_numbers() {
+        let mut bodies = niche();
+        bodies.push(body(3, block([4.0; 3]), placed(0.0, 0.0, 6.0)));
+        for placing in [anywhere(), overhead_fixed()] {
+            let is_auto = placing != overhead_fixed();
+            let choice = choose(&design(4, &[2, 3]), &station(placing), &bodies, &[]);
+            let [fault] = &choice.diagnostics[..] else { panic!("{:?}", choice.diagnostics) };
+            assert_eq!(fault.code, "E0601");
+            assert!(fault.message.contains("`part[4]`: 0 of "), "{}", fault.message);
+            assert_eq!(fault.message.starts_with("no allowed camera"), is_auto);
+        }
+    }
+
+    #[test]
+    fn a_fixed_camera_is_a_choice_of_one() {
+        let targets = [Target { component: 2, face: 1, weight: 2.0 }];
+        let choice = choose(&design(3, &[2]), &station(overhead_fixed()), &niche(), &targets);
+        let [only] = &choice.table[..] else { panic!() };
+        // 10 mm at (350 + 10 - 14) mm, 2162 px: 62.5 px square.
+        assert!((f64::from(only.pixels) / (62.5 * 62.5) - 1.0).abs() < 0.06, "{}", only.pixels);
+        assert_eq!((only.surfaces, choice.best), (1, 0));
+        assert!((only.score - 2.0 * (f64::from(only.pixels) / 16.0).ln_1p()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_table_does_not_depend_on_the_number_of_threads() {
+        let targets = [Target { component: 2, face: 1, weight: 1.0 }];
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| choose(&design(3, &[2]), &station(anywhere()), &niche(), &targets))
+        };
+        let (one, three) = (run(1), run(3));
+        assert_eq!(one.table, three.table);
+        assert_eq!(one.best, three.best);
+    }
+}
