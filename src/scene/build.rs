@@ -52,6 +52,7 @@ pub fn camera(spec: &CameraSpec, placing: Placed) -> Camera {
         position: [0, 1, 2].map(|i| spec.aim[i] + placing.distance * back[i]),
         axes: [right, cross(forward, right), forward],
         focal: spec.focal.nominal / spec.pitch,
+        centre: spec.image.map(|n| f64::from(n) / 2.0),
         k1: (spec.k1.low + spec.k1.high) / 2.0,
         size: spec.image,
     }

@@ -76,7 +76,7 @@ impl ItemBuffer {
         Self::on_grid(bodies, camera, &PixelGrid::of(camera))
     }
 
-    /// The same with a grid made before by [`PixelGrid::of`] a camera of the same focal length, k1 and size.
+    /// The same with a grid made before by [`PixelGrid::of`] a camera of the same focal length, centre, k1 and size.
     pub fn on_grid(bodies: &[Body], camera: &Camera, grid: &PixelGrid) -> ItemBuffer {
         let mut canvas = Canvas::new(grid);
         for body in bodies {
@@ -154,7 +154,7 @@ impl Mask {
 }
 
 impl PixelGrid {
-    /// The grid of a camera; only its focal length, k1 and size count.
+    /// The grid of a camera; only its focal length, centre, k1 and size count.
     pub fn of(camera: &Camera) -> PixelGrid {
         let [width, height] = camera.size.map(|n| n as usize);
         let centres = (0..height).flat_map(|y| (0..width).map(move |x| [x as f64 + 0.5, y as f64 + 0.5]));
@@ -184,9 +184,8 @@ impl PixelGrid {
 ///
 /// With the seen radius s and k = k1 s², the undistorted radius is t s where t + k t³ = 1.
 fn tangents(camera: &Camera, pixel: [f64; 2]) -> (f64, f64) {
-    let half = [f64::from(camera.size[0]) / 2.0, f64::from(camera.size[1]) / 2.0];
-    let seen = [pixel[0] - half[0], pixel[1] - half[1]];
-    let k = (camera.k1 * (seen[0] * seen[0] + seen[1] * seen[1]) / (half[0] * half[0])).max(FOLD);
+    let seen = [pixel[0] - camera.centre[0], pixel[1] - camera.centre[1]];
+    let k = (camera.k1 * (seen[0] * seen[0] + seen[1] * seen[1]) / camera.centre[0].powi(2)).max(FOLD);
     let mut t = 1.0;
     // Quadratic convergence from an error below 0.5: six rounds reach rounding for every lens short of folding.
     for _ in 0..if k == 0.0 { 0 } else { 6 } {
