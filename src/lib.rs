@@ -18,6 +18,8 @@ pub mod scene;
 #[cfg(feature = "compile")]
 pub mod solid;
 #[cfg(feature = "compile")]
+pub mod variation;
+#[cfg(feature = "compile")]
 pub mod view;
 
 pub mod runtime;

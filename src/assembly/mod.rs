@@ -1,3 +1,72 @@
 //! Stage 4: solids and poses become contacts, liaisons, error trees, an insertion order and error modes.
+//!
+//! In: a [`Design`] and one nominal solid per component. Out: an [`Analysis`] and diagnostics; from these the error trees,
+//! the object tree and the error modes with the poses they lead to. Never renders, never decides what can be seen.
 
+pub mod contact;
+pub mod error_tree;
+pub mod fault;
+pub mod insertion;
+pub mod liaison;
 pub mod place;
+
+mod check;
+mod columns;
+mod limits;
+mod overlap;
+mod rest;
+#[cfg(test)]
+pub(crate) mod sample;
+
+use crate::design::model::Design;
+use crate::diag::Diagnostic;
+use crate::solid::Solid;
+use std::sync::Arc;
+
+/// What the assembly is, as opposed to what its parts are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Analysis {
+    pub liaison: liaison::Liaison,
+    pub insertion: insertion::Insertion,
+}
+
+/// Contacts, liaisons and insertion order at nominal, and what is wrong with them (E0501, W0502, E0503).
+/// `solids` holds one solid per component at nominal, in its part's frame.
+pub fn analyse(design: &Design, solids: &[Arc<Solid>]) -> (Analysis, Vec<Diagnostic>) {
+    let found = contact::find(design, solids);
+    let liaison = liaison::Liaison::new(design.components.len(), found.contacts);
+    let (insertion, entering) = insertion::take_apart(design, solids, &liaison);
+    let diagnostics = check::check(design, solids, &liaison, &found.clashes, &entering);
+    (Analysis { liaison, insertion }, diagnostics)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Instant;
+
+    #[test]
+    #[ignore = "a measurement"]
+    fn time() {
+        let a = sample::pattern_wheel();
+        for _ in 0..3 {
+            let t = Instant::now();
+            let found = contact::find(&a.design, &a.solids);
+            println!("contacts {:?}", t.elapsed());
+            let liaison = liaison::Liaison::new(a.design.components.len(), found.contacts);
+            let t = Instant::now();
+            let (insertion, entering) = insertion::take_apart(&a.design, &a.solids, &liaison);
+            println!("insertion {:?}", t.elapsed());
+            let t = Instant::now();
+            check::check(&a.design, &a.solids, &liaison, &found.clashes, &entering);
+            println!("check {:?}", t.elapsed());
+            let t = Instant::now();
+            let modes = fault::modes(&a.design, &liaison, &insertion, &a.solids);
+            println!("modes {:?}", t.elapsed());
+            let t = Instant::now();
+            let m = modes.iter().find(|m| m.kind == fault::FaultKind::Misplaced).unwrap();
+            fault::apply(m, [0.3, 0.5, 0.0], &a.solids, &place::place(&a.design, &a.design.nominal()));
+            println!("apply {:?}", t.elapsed());
+        }
+    }
+}

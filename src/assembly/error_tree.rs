@@ -1,0 +1,163 @@
+//! Error trees and the object tree (section III, Figs. 3 and 9 of the paper).
+//!
+//! In: the liaison diagram. Out: for a component the tree of those an error in it can spread to, breadth-first over the
+//! contacts; a contact that would close a loop is kept as a dashed edge. The trees of all watched components combine into
+//! the object tree. How many levels are used is settled later, by visibility.
+
+use super::contact::FaceRef;
+use super::liaison::Liaison;
+use crate::design::model::Design;
+use serde::Serialize;
+use std::collections::VecDeque;
+
+/// What an error in one component can do to the others.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ErrorTree {
+    /// The root first, then by level; parents before their children.
+    pub nodes: Vec<TreeNode>,
+    /// Contacts between components of the tree that are not in it: they would close a loop.
+    pub dashed: Vec<Edge>,
+}
+
+/// A component in an error tree.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TreeNode {
+    /// Index into [`Design::components`].
+    pub component: usize,
+    /// Index into [`ErrorTree::nodes`]; `None` for the root.
+    pub parent: Option<usize>,
+    /// 0 for the root.
+    pub level: u32,
+    /// The root: all its surfaces that touch something. Others: those that touch the parent.
+    pub surfaces: Vec<FaceRef>,
+}
+
+/// Two nodes of a tree that touch without being parent and child.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Edge {
+    /// Indices into [`ErrorTree::nodes`], the smaller first.
+    pub nodes: [usize; 2],
+}
+
+/// The error tree of a component, down to `depth` levels below it (`None`: all that can be reached).
+pub fn error_tree(liaison: &Liaison, root: usize, depth: Option<u32>) -> ErrorTree {
+    let mut nodes = vec![TreeNode { component: root, parent: None, level: 0, surfaces: liaison.surfaces(root) }];
+    let mut queue = VecDeque::from([0]);
+    while let Some(at) = queue.pop_front() {
+        if depth.is_some_and(|d| nodes[at].level >= d) {
+            continue;
+        }
+        for neighbour in liaison.neighbours(nodes[at].component) {
+            if nodes.iter().all(|n| n.component != neighbour) {
+                queue.push_back(nodes.len());
+                nodes.push(child(liaison, &nodes, at, neighbour));
+            }
+        }
+    }
+    let dashed = dashed(liaison, &nodes);
+    ErrorTree { nodes, dashed }
+}
+
+fn child(liaison: &Liaison, nodes: &[TreeNode], parent: usize, component: usize) -> TreeNode {
+    let contacts = liaison.between(nodes[parent].component, component);
+    let mut surfaces: Vec<FaceRef> = contacts.filter_map(|c| c.on(component)).collect();
+    surfaces.sort();
+    surfaces.dedup();
+    TreeNode { component, parent: Some(parent), level: nodes[parent].level + 1, surfaces }
+}
+
+fn dashed(liaison: &Liaison, nodes: &[TreeNode]) -> Vec<Edge> {
+    let touch = |i: usize, j: usize| liaison.between(nodes[i].component, nodes[j].component).next().is_some();
+    let in_tree = |i: usize, j: usize| nodes[j].parent == Some(i);
+    let pairs = (0..nodes.len()).flat_map(|i| (i + 1..nodes.len()).map(move |j| (i, j)));
+    pairs.filter(|(i, j)| touch(*i, *j) && !in_tree(*i, *j)).map(|(i, j)| Edge { nodes: [i, j] }).collect()
+}
+
+/// The error trees of all watched components under one root, the assembly as a whole.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObjectTree {
+    /// In the order of `inspect`.
+    pub trees: Vec<ErrorTree>,
+}
+
+/// The object tree of a design; a watch without a depth of its own has its tree in full.
+pub fn object_tree(design: &Design, liaison: &Liaison) -> ObjectTree {
+    let trees = design.inspect.watch.iter().map(|w| error_tree(liaison, w.component, w.depth)).collect();
+    ObjectTree { trees }
+}
+
+/// An error tree in the user's names, for goldens and `--emit error-trees`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TreeSummary {
+    pub component: String,
+    pub spreads_to: Vec<TreeSummary>,
+    /// Components touched that stand elsewhere in the tree.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub also_touches: Vec<String>,
+}
+
+/// An error tree with names in place of indices.
+pub fn summary(design: &Design, tree: &ErrorTree) -> TreeSummary {
+    summarise(design, tree, 0)
+}
+
+fn summarise(design: &Design, tree: &ErrorTree, node: usize) -> TreeSummary {
+    let name = |n: usize| design.components[tree.nodes[n].component].name.clone();
+    let children = (0..tree.nodes.len()).filter(|n| tree.nodes[*n].parent == Some(node));
+    TreeSummary {
+        component: name(node),
+        spreads_to: children.map(|n| summarise(design, tree, n)).collect(),
+        also_touches: tree.dashed.iter().filter(|e| e.nodes[0] == node).map(|e| name(e.nodes[1])).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assembly::{contact::contacts, sample};
+
+    fn liaison() -> (sample::Assembly, Liaison) {
+        let a = sample::pattern_wheel();
+        let liaison = Liaison::new(a.design.components.len(), contacts(&a.design, &a.solids));
+        (a, liaison)
+    }
+
+    /// Fig. 9: hd_pin, then both wheels, then the alignment pins (and here the unlatch pin), then ring and gear.
+    #[test]
+    fn the_error_tree_of_the_high_density_pin_is_the_papers() {
+        let (_, liaison) = liaison();
+        let tree = error_tree(&liaison, 8, None);
+        let level =
+            |l: u32| -> Vec<usize> { tree.nodes.iter().filter(|n| n.level == l).map(|n| n.component).collect() };
+        assert_eq!(level(0), [8]);
+        assert_eq!(level(1), [3, 4]);
+        assert_eq!(level(2), [5, 6, 7, 9]);
+        assert_eq!(level(3), [0, 2]);
+        assert_eq!(level(4), [1]);
+        let dashed: Vec<_> = tree.dashed.iter().map(|e| e.nodes.map(|n| tree.nodes[n].component)).collect();
+        for pin in [5, 6, 7, 9] {
+            assert!(dashed.contains(&[4, pin]), "wheel_a2 touches pin {pin} outside the tree");
+        }
+    }
+
+    #[test]
+    fn every_contact_is_a_tree_edge_or_a_dashed_one() {
+        let (_, liaison) = liaison();
+        for root in 0..liaison.components {
+            let tree = error_tree(&liaison, root, None);
+            let pairs: usize = (0..liaison.components).map(|c| liaison.neighbours(c).len()).sum::<usize>() / 2;
+            assert_eq!(tree.nodes.len(), liaison.components);
+            assert_eq!(tree.nodes.len() - 1 + tree.dashed.len(), pairs);
+        }
+    }
+
+    #[test]
+    fn depth_cuts_the_tree_and_its_dashed_edges() {
+        let (a, liaison) = liaison();
+        let tree = error_tree(&liaison, 8, Some(1));
+        assert_eq!(tree.nodes.len(), 3);
+        assert!(tree.dashed.is_empty());
+        assert_eq!(object_tree(&a.design, &liaison).trees.len(), 9);
+        assert_eq!(summary(&a.design, &tree).spreads_to[1].component, "wheel_a2");
+    }
+}
