@@ -4,7 +4,7 @@ use super::edges::{self, Ground};
 use super::plan::{NodePlan, Plan};
 use super::shots::Shot;
 use super::synthesise::Shots;
-use crate::assembly::fault::{ErrorMode, FaultKind};
+use crate::assembly::fault::{ErrorMode, FaultKind, Motion};
 use crate::design::model::Design;
 use crate::runtime::camera::{Camera, Vec3};
 use crate::runtime::grid::Grid;
@@ -69,10 +69,21 @@ fn samples<'a>(context: &'a Context, plan: &NodePlan) -> Vec<Sample<'a>> {
     for &m in &plan.modes {
         let mode = &context.modes[m];
         for (low, high, shots) in pieces(context, m) {
-            out.push(sample(mode.kind.name(), mode.sweep_text(low, high), shots));
+            out.push(sample(mode.kind.word(), sweep(&mode.motion, low, high), shots));
         }
     }
     out
+}
+
+/// What part of a sweep a hypothesis covers, for people.
+fn sweep(motion: &Motion, low: f64, high: f64) -> String {
+    match motion {
+        Motion::Slide { from, to, .. } => {
+            let at = |share: f64| from + (to - from) * share;
+            format!("{:.1} .. {:.1} mm", at(low), at(high))
+        }
+        _ => String::new(),
+    }
 }
 
 /// The shots of a mode, in pieces of its sweep: (from, to, shots).

@@ -80,9 +80,16 @@ impl Drawn {
             finishes: self.finishes.clone(),
         };
         for (mode, u) in faults {
-            match fault::apply(mode, *u, &self.solids, &self.poses).pose {
+            let faulted = fault::apply(mode, *u, &self.solids, &self.poses);
+            match faulted.pose {
                 Some(pose) => instance.poses[mode.component] = pose,
                 None => instance.solids[mode.component] = None,
+            }
+            if let Some(other) = faulted.solid {
+                instance.solids[mode.component] = Some(other);
+            }
+            for (component, pose) in faulted.pushed {
+                instance.poses[component] = pose;
             }
         }
         instance

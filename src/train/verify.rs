@@ -149,7 +149,7 @@ fn promise(
             escapes += escaped;
             trials += verdicts.len() as u32;
             let escape = rate(escaped, verdicts.len() as u32);
-            rates.push(ModeRate { component: component.clone(), fault: modes[m].kind.name().into(), escape });
+            rates.push(ModeRate { component: component.clone(), fault: modes[m].kind.word().into(), escape });
         }
     }
     Promise {
