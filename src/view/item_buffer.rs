@@ -11,8 +11,9 @@
 //! Distortion is exact for any mesh: triangles stay straight and it is the pixel centres that are moved, once per lens
 //! ([`PixelGrid`]). Back faces are culled, which takes the coincident faces of mated parts out of each other's way.
 
-use crate::runtime::camera::{Camera, Vec3, cross, dot, sub};
+use crate::runtime::camera::{Camera, Vec3, cross, dot};
 use crate::scene::Body;
+use nalgebra::{Matrix4, RowVector4};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -63,6 +64,11 @@ pub struct PixelBox {
 pub struct PixelGrid {
     width: usize,
     height: usize,
+    /// In px.
+    focal: f64,
+    centre: [f64; 2],
+    /// k1 for radii in tangents.
+    bend: f64,
     /// Tangents to the right and down of the ray through each pixel centre; `u` grows along every row.
     u: Vec<f64>,
     v: Vec<f64>,
@@ -161,23 +167,45 @@ impl PixelGrid {
         let (u, v): (Vec<f64>, Vec<f64>) = centres.map(|pixel| tangents(camera, pixel)).unzip();
         let ends = |row: &[f64]| row.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
         let row_v = v.chunks(width.max(1)).map(ends).collect();
-        PixelGrid { width, height, u, v, row_v }
+        let bend = camera.k1 * (camera.focal / camera.centre[0]).powi(2);
+        PixelGrid { width, height, focal: camera.focal, centre: camera.centre, bend, u, v, row_v }
     }
 
     /// The rows that may hold directions with `v` between `low` and `high`.
     fn rows(&self, [low, high]: [f64; 2]) -> Range<usize> {
-        let first = self.row_v.partition_point(|row| row[1] < low - SLACK);
-        first..self.row_v.partition_point(|row| row[0] <= high + SLACK).max(first)
+        let guess = |v: f64| self.guess(v, 0.0, self.centre[1]);
+        let first = seek(self.height, guess(low), |y| self.row_v[y][1] < low - SLACK);
+        first..seek(self.height, guess(high), |y| self.row_v[y][0] <= high + SLACK).max(first)
     }
 
     /// The pixels (indices into the image) of row `y` that may lie in the triangle.
     fn span(&self, y: usize, triangle: &Triangle) -> Range<usize> {
-        let [low, high] = triangle.across(self.row_v[y]);
-        let row = &self.u[y * self.width..][..self.width];
-        let first = row.partition_point(|&u| u < low - SLACK);
-        let end = row.partition_point(|&u| u <= high + SLACK).max(first);
-        y * self.width + first..y * self.width + end
+        let limits @ [low, high] = self.row_v[y];
+        let across = (low + high) / 2.0;
+        let [low, high] = triangle.across(limits);
+        let start = y * self.width;
+        let row = &self.u[start..start + self.width];
+        let guess = |u: f64| self.guess(u, across, self.centre[0]);
+        let first = seek(row.len(), guess(low), |x| row[x] < low - SLACK);
+        start + first..start + seek(row.len(), guess(high), |x| row[x] <= high + SLACK).max(first)
     }
+
+    /// About where along its axis a direction is seen: tangents along and across the axis, principal point along it.
+    fn guess(&self, along: f64, across: f64, centre: f64) -> usize {
+        (centre + self.focal * along * (1.0 + self.bend * (along * along + across * across))) as usize
+    }
+}
+
+/// The first index from which `before` is false (it is true, then false, over 0..length), sought from a good guess.
+fn seek(length: usize, guess: usize, before: impl Fn(usize) -> bool) -> usize {
+    let mut at = guess.min(length);
+    while at > 0 && !before(at - 1) {
+        at -= 1;
+    }
+    while at < length && before(at) {
+        at += 1;
+    }
+    at
 }
 
 /// Tangents of the ray through a pixel: the inverse of [`Camera::project`], by Newton's method.
@@ -208,7 +236,8 @@ impl<'a> Canvas<'a> {
     }
 
     fn draw(&mut self, body: &Body, camera: &Camera) {
-        let seen: Vec<Vec3> = body.mesh.positions.iter().map(|p| to_camera(camera, (body.pose * p).into())).collect();
+        let to_camera = to_camera(camera) * body.pose.to_matrix();
+        let seen: Vec<Vec3> = body.mesh.positions.iter().map(|p| to_camera.transform_point(p).into()).collect();
         for (corners, &face) in body.mesh.triangles.iter().zip(&body.mesh.faces) {
             if let Some(triangle) = Triangle::new(corners.map(|i| seen[i as usize])) {
                 self.fill(&triangle, [1 + body.component as u32, face]);
@@ -235,9 +264,10 @@ fn in_front((depth, item): (f64, [u32; 2]), (old_depth, old_item): (f64, [u32; 2
     depth < old_depth - COINCIDENT || (depth <= old_depth + COINCIDENT && item < old_item)
 }
 
-fn to_camera(camera: &Camera, p: Vec3) -> Vec3 {
-    let d = sub(p, camera.position);
-    camera.axes.map(|axis| dot(axis, d))
+/// World frame to camera frame.
+fn to_camera(camera: &Camera) -> Matrix4<f64> {
+    let rows = camera.axes.map(|[x, y, z]| RowVector4::new(x, y, z, -dot([x, y, z], camera.position)));
+    Matrix4::from_rows(&[rows[0], rows[1], rows[2], RowVector4::new(0.0, 0.0, 0.0, 1.0)])
 }
 
 /// A triangle that faces the camera, in the camera's frame.
@@ -246,6 +276,9 @@ struct Triangle {
     edges: [Vec3; 3],
     /// Six times the volume of the tetrahedron with the camera; the depth is this over the sum of the edge functions.
     volume: f64,
+    /// Lines u = p + q v that bound it to the left and to the right, widened by rounding.
+    left: [[f64; 2]; 3],
+    right: [[f64; 2]; 3],
     /// Bounds of its directions.
     u: [f64; 2],
     v: [f64; 2],
@@ -255,33 +288,27 @@ impl Triangle {
     /// `None` for triangles that show their back or lie behind the camera.
     fn new([a, b, c]: [Vec3; 3]) -> Option<Triangle> {
         let volume = -dot(a, cross(b, c));
-        let [nearest, farthest] = [a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2])];
-        if volume <= 0.0 || farthest <= 0.0 {
+        if volume <= 0.0 || a[2].max(b[2]).max(c[2]) <= 0.0 {
             return None;
         }
+        let edges = [cross(b, a), cross(c, b), cross(a, c)];
+        let is_near = a[2].min(b[2]).min(c[2]) < NEAR;
         let bounds = |axis: usize| {
-            if nearest < NEAR {
+            if is_near {
                 return [f64::MIN, f64::MAX];
             }
             let [p, q, r] = [a, b, c].map(|corner| corner[axis] / corner[2]);
             [p.min(q).min(r), p.max(q).max(r)]
         };
-        Some(Triangle { edges: [cross(b, a), cross(c, b), cross(a, c)], volume, u: bounds(0), v: bounds(1) })
+        let left = edges.map(|e| if e[0] > 0.0 { line(e, 1.0) } else { [f64::MIN, 0.0] });
+        let right = edges.map(|e| if e[0] < 0.0 { line(e, -1.0) } else { [f64::MAX, 0.0] });
+        Some(Triangle { edges, volume, left, right, u: bounds(0), v: bounds(1) })
     }
 
-    /// Bounds of `u` in the triangle over all `v` between the two given; empty (low above high) where there are none.
+    /// Bounds of `u` in the triangle over all `v` between the two given; low above high where there are none.
     fn across(&self, [v0, v1]: [f64; 2]) -> [f64; 2] {
-        let [mut low, mut high] = self.u;
-        for [a, b, c] in self.edges {
-            let most = c + (b * v0).max(b * v1) + ROUNDING * (c.abs() + b.abs());
-            if a > 0.0 {
-                low = low.max(-most / a);
-            } else if a < 0.0 {
-                high = high.min(-most / a);
-            } else if most < 0.0 {
-                return [f64::MAX, f64::MIN];
-            }
-        }
+        let low = self.left.iter().fold(self.u[0], |low, [p, q]| low.max(p + (q * v0).min(q * v1)));
+        let high = self.right.iter().fold(self.u[1], |high, [p, q]| high.min(p + (q * v0).max(q * v1)));
         [low, high]
     }
 
@@ -300,6 +327,11 @@ impl Triangle {
         }
         (sum > 0.0).then(|| self.volume / sum)
     }
+}
+
+/// The line u = p + q v on which an edge function vanishes, moved outwards (`side`: 1 left, -1 right) by its rounding.
+fn line([a, b, c]: Vec3, side: f64) -> [f64; 2] {
+    [-c / a - side * ROUNDING * (c.abs() + b.abs()) / a.abs(), -b / a]
 }
 
 #[cfg(test)]
