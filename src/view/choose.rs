@@ -10,6 +10,8 @@
 
 use super::item_buffer::{ItemBuffer, PixelGrid};
 use super::nodes::{Seen, seen};
+use crate::assembly::contact::FaceRef;
+use crate::assembly::error_tree::ErrorTree;
 use crate::design::model::{CameraPlacing, Design, Station};
 use crate::diag::Diagnostic;
 use crate::runtime::camera::Camera;
@@ -19,6 +21,7 @@ use crate::units::Range;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// A component or surface seen in fewer pixels than this is not seen: a 4 × 4 px patch is the least a gradient fits in.
@@ -66,6 +69,24 @@ pub struct Choice {
     pub seen: Vec<Seen>,
     /// E0601 for every watched component it does not see.
     pub diagnostics: Vec<Diagnostic>,
+}
+
+/// The faces of the error trees, each once. A face of a root weighs 1, of every level below half of the one above, because
+/// the further an error has to spread the less it shows.
+pub fn targets(trees: &[ErrorTree]) -> Vec<Target> {
+    let mut levels: BTreeMap<FaceRef, u32> = BTreeMap::new();
+    for node in trees.iter().flat_map(|tree| &tree.nodes) {
+        for &face in &node.surfaces {
+            let level = levels.entry(face).or_insert(node.level);
+            *level = node.level.min(*level);
+        }
+    }
+    let target = |(at, level): (FaceRef, u32)| Target {
+        component: at.component,
+        face: at.face as u32,
+        weight: 0.5f64.powi(level as i32),
+    };
+    levels.into_iter().map(target).collect()
 }
 
 /// Chooses the station's camera; a fixed one is scored and checked as a choice of one.
@@ -273,6 +294,7 @@ fn describe(view: &Scored, watch: usize) -> String {
 mod tests {
     use super::super::shapes::{block, body, placed};
     use super::*;
+    use crate::assembly::error_tree::TreeNode;
     use crate::design::model::{CameraSpec, Component, Inspect, PoseExpr, Response, Train, Watch};
     use crate::diag::Span;
 
@@ -348,6 +370,21 @@ mod tests {
             body(1, block([50.0, 4.0, 40.0]), placed(0.0, -10.0, 4.0)),
             body(2, block([10.0, 10.0, 10.0]), placed(0.0, 0.0, 4.0)),
         ]
+    }
+
+    #[test]
+    fn a_face_in_several_trees_counts_once_at_its_highest_level() {
+        let face = |component, face| FaceRef { component, face };
+        let node = |component, level, surfaces| TreeNode { component, parent: None, level, surfaces };
+        let tree = |nodes| ErrorTree { nodes, dashed: Vec::new() };
+        let trees = [
+            tree(vec![node(1, 0, vec![face(1, 2)]), node(0, 1, vec![face(0, 5)]), node(2, 2, vec![face(2, 0)])]),
+            tree(vec![node(2, 0, vec![face(2, 0), face(2, 1)]), node(0, 1, vec![face(0, 5)])]),
+        ];
+        let weights: Vec<f64> = targets(&trees).iter().map(|t| t.weight).collect();
+        let faces: Vec<(usize, u32)> = targets(&trees).iter().map(|t| (t.component, t.face)).collect();
+        assert_eq!(faces, [(0, 5), (1, 2), (2, 0), (2, 1)]);
+        assert_eq!(weights, [0.5, 1.0, 1.0, 1.0]);
     }
 
     #[test]

@@ -7,6 +7,7 @@ pub mod choose;
 pub mod item_buffer;
 pub mod nodes;
 pub mod picture;
+mod raster;
 
 #[cfg(test)]
 mod shapes;
