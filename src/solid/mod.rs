@@ -3,7 +3,48 @@
 //! In: [`crate::design::model::Part`] and one value per dimension. Out: [`Solid`] in the part's frame, or diagnostics that
 //! name the features. Never a wrong solid: what fails the checks is an error.
 
+//! Method: boundary evaluation after Requicha and Voelcker (1985), with coincident surfaces made one before anything is
+//! computed. `csg` resolves the part into half-spaces over interned surfaces, `arrange` cuts the curves they share into
+//! arcs and tells which bound faces, `brep` links arcs into loops and faces and checks them, `measure` integrates area
+//! and volume, `mesh` triangulates.
+
+mod arrange;
+mod brep;
+mod csg;
+mod intersect;
+mod locus;
+mod measure;
+mod mesh;
+mod quality;
+mod region;
+mod ring;
+mod surface;
+mod tolerance;
+
+#[cfg(test)]
+mod tests;
+
+use crate::design::model::{Part, Values};
+use crate::diag::Diagnostic;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
+
+pub use quality::Quality;
+pub use region::Counts;
+
+/// The solid of a part at these dimensions: one value per dimension, indexed by `DimId`.
+///
+/// Errors, each with the features it comes from: E0401 nothing is left, E0405 the part falls into pieces, E0406 features
+/// meet in a curve that is neither a line nor a circle, E0407 features touch along a line only, E0408 a size or place
+/// that makes no sense, E0410 the boundary cannot be closed.
+pub fn evaluate(part: &Part, values: &Values, quality: &Quality) -> Result<Solid, Vec<Diagnostic>> {
+    let tree = csg::Tree::build(part, values)?;
+    let arrangement = arrange::arrange(&tree)?;
+    let mut solid = brep::build(&tree, arrangement, quality)?;
+    solid.mesh = mesh::triangulate(&solid, quality).map_err(|face| {
+        vec![brep::internal(&tree, &format!("`{}` cannot be filled with triangles", solid.faces[face].name))]
+    })?;
+    Ok(solid)
+}
 
 /// A surface without a sense: which side is material belongs to the face. All in the part's frame, mm and rad.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +97,7 @@ pub struct Edge {
     pub ends: [Option<usize>; 2],
     /// The two faces, indices into [`Solid::faces`] (the same twice for a seam).
     pub faces: [usize; 2],
-    /// Samples from end to end, shared by both faces' triangles.
+    /// Samples from end to end, shared by both faces' triangles; a closed edge returns to its first sample.
     pub samples: Vec<Point3<f64>>,
 }
 

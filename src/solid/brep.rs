@@ -1,0 +1,382 @@
+//! Faces, edges and corners from the arrangement, with the checks that stand between a slip and a wrong solid.
+//!
+//! In: [`Tree`], [`Arrangement`], [`Quality`]. Out: a [`Solid`] without triangles, or diagnostics.
+//! Checked here: two faces on every edge with opposite senses, every loop closed, Euler's number of every shell, one
+//! body. Nothing is repaired.
+
+use super::arrange::{Arc, Arrangement, Use};
+use super::csg::Tree;
+use super::measure::{self, Flux};
+use super::ring::{Ring, offsets};
+use super::{Edge, Face, Quality, Solid, Surface, TriMesh};
+use crate::diag::Diagnostic;
+use nalgebra::{Point3, Vector3};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+type Faults = Vec<Diagnostic>;
+/// A surface with the sense of its faces: (surface, outward).
+type Sheet = (usize, bool);
+/// A loop of (edge, runs forward).
+type Loop = Vec<(usize, bool)>;
+
+/// Traces, groups, measures and checks.
+pub(super) fn build(tree: &Tree, mut arrangement: Arrangement, quality: &Quality) -> Result<Solid, Faults> {
+    check_manifold(tree, &arrangement)?;
+    let vertices = compact(&mut arrangement);
+    let mut edges: Vec<Edge> = arrangement.arcs.iter().map(|a| edge(&arrangement, a, &vertices, quality)).collect();
+    let mut drafts = Vec::new();
+    for (sheet, halves) in sheets(&arrangement.arcs) {
+        let loops = trace(tree, &arrangement, sheet, &halves)?;
+        drafts.extend(group(tree, sheet, loops, &edges, vertices.len())?);
+    }
+    drafts.extend(whole_spheres(tree, &drafts));
+    if drafts.is_empty() {
+        return Err(vec![empty(tree)]);
+    }
+    drafts.iter_mut().for_each(|d| d.owner = owner(tree, &arrangement, d));
+    drafts.sort_by_key(|d| (d.owner, d.sheet, d.loops.first().and_then(|l| l.first().copied())));
+    link(&mut edges, &drafts);
+    let fluxes = fluxes(tree, &arrangement, &drafts);
+    let shells = check_shells(tree, &drafts, &edges, &fluxes, &vertices)?;
+    let faces = drafts.iter().zip(&fluxes).map(|(d, f)| d.face(tree, f.area)).collect();
+    let (area, volume) = (fluxes.iter().map(|f| f.area).sum(), shells.iter().sum());
+    let surfaces = tree.surfaces.clone();
+    let solid = Solid { surfaces, faces, edges, vertices, volume, area, mesh: TriMesh::default() };
+    Ok(drop_unused_surfaces(solid))
+}
+
+/// A face before it is measured.
+struct Draft {
+    sheet: Sheet,
+    loops: Vec<Loop>,
+    /// Round the north pole of a sphere.
+    north: bool,
+    /// Leaf and side that name it.
+    owner: (usize, usize),
+}
+
+impl Draft {
+    fn face(&self, tree: &Tree, area: f64) -> Face {
+        let leaf = &tree.leaves[self.owner.0];
+        let name = format!("{}.{}", leaf.name, leaf.sides[self.owner.1].name);
+        Face { surface: self.sheet.0, outward: self.sheet.1, loops: self.loops.clone(), area, name }
+    }
+}
+
+fn empty(tree: &Tree) -> Diagnostic {
+    let message = format!("nothing of `{}` is left", tree.part.name);
+    let at = tree.part.features.last().map_or(tree.part.span, |f| f.span);
+    Diagnostic::error("E0401", at, message).label("nothing remains after this")
+}
+
+/// An error of the kernel, not of the spec: said so, with the part's name.
+pub(super) fn internal(tree: &Tree, what: &str) -> Diagnostic {
+    let message = format!("the boundary of `{}` cannot be closed: {what}", tree.part.name);
+    Diagnostic::error("E0410", tree.part.span, message)
+        .note("no solid was made of it; features that almost touch are the usual cause")
+}
+
+/// Every arc must have two faces, one on each side of its direction.
+fn check_manifold(tree: &Tree, arrangement: &Arrangement) -> Result<(), Faults> {
+    for arc in &arrangement.arcs {
+        let forward = arc.uses.iter().filter(|u| u.forward).count();
+        if arc.uses.len() == 2 && forward == 1 {
+            continue;
+        }
+        if arc.uses.len() == 4 {
+            return Err(vec![non_manifold(tree, arrangement, arc)]);
+        }
+        return Err(vec![internal(tree, &format!("an edge has {} faces", arc.uses.len()))]);
+    }
+    Ok(())
+}
+
+fn non_manifold(tree: &Tree, arrangement: &Arrangement, arc: &Arc) -> Diagnostic {
+    let mut leaves: Vec<usize> = arc.uses.iter().map(|u| u.leaf).collect();
+    leaves.sort_unstable();
+    leaves.dedup();
+    let names: Vec<String> = leaves.iter().map(|l| format!("`{}`", tree.leaves[*l].name)).collect();
+    let p = arrangement.curves[arc.curve].at((arc.span[0] + arc.span[1]) / 2.0);
+    let message = format!("{} of `{}` touch along a line only", names.join(" and "), tree.part.name);
+    let spans = leaves.iter().map(|l| tree.part.features[tree.leaves[*l].feature].span);
+    let last = spans.clone().last().unwrap_or(tree.part.span);
+    let fault = Diagnostic::error("E0407", last, message)
+        .note(format!("near ({:.3}, {:.3}, {:.3}) mm; let them overlap or keep them apart", p.x, p.y, p.z));
+    spans.take(leaves.len().saturating_sub(1)).fold(fault, |f, span| f.also(span, "touches it"))
+}
+
+/// Keeps the corners that arcs end at, in order.
+fn compact(arrangement: &mut Arrangement) -> Vec<Point3<f64>> {
+    let mut place: Vec<Option<usize>> = vec![None; arrangement.corners.len()];
+    arrangement.arcs.iter().flat_map(|a| a.ends).flatten().for_each(|c| place[c] = Some(0));
+    let mut vertices = Vec::new();
+    for (slot, p) in place.iter_mut().zip(&arrangement.corners).filter(|(s, _)| s.is_some()) {
+        *slot = Some(vertices.len());
+        vertices.push(*p);
+    }
+    for end in arrangement.arcs.iter_mut().filter_map(|a| a.ends.as_mut()).flatten() {
+        *end = place[*end].unwrap_or(0);
+    }
+    vertices
+}
+
+fn edge(arrangement: &Arrangement, arc: &Arc, vertices: &[Point3<f64>], quality: &Quality) -> Edge {
+    let locus = &arrangement.curves[arc.curve];
+    let mut samples: Vec<Point3<f64>> = quality.parameters(locus, arc.span).iter().map(|t| locus.at(*t)).collect();
+    let last = samples.len() - 1;
+    match arc.ends {
+        Some([a, b]) => (samples[0], samples[last]) = (vertices[a], vertices[b]),
+        None => samples[last] = samples[0],
+    }
+    let ends = arc.ends.map_or([None, None], |e| e.map(Some));
+    Edge { curve: locus.curve(), ends, faces: [usize::MAX; 2], samples }
+}
+
+/// Half-edges by sheet.
+fn sheets(arcs: &[Arc]) -> BTreeMap<Sheet, Vec<(usize, bool)>> {
+    let mut sheets: BTreeMap<Sheet, Vec<(usize, bool)>> = BTreeMap::new();
+    for (i, arc) in arcs.iter().enumerate() {
+        for &Use { surface, outward, forward, .. } in &arc.uses {
+            sheets.entry((surface, outward)).or_default().push((i, forward));
+        }
+    }
+    sheets
+}
+
+/// Links half-edges to loops: at each corner, the next is the first met turning clockwise from the way one came.
+fn trace(tree: &Tree, arrangement: &Arrangement, sheet: Sheet, halves: &[(usize, bool)]) -> Result<Vec<Loop>, Faults> {
+    let mut leaving: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (h, &(arc, forward)) in halves.iter().enumerate() {
+        if let Some(ends) = arrangement.arcs[arc].ends {
+            leaving.entry(ends[usize::from(!forward)]).or_default().push(h);
+        }
+    }
+    let mut used = vec![false; halves.len()];
+    let mut loops = Vec::new();
+    for start in 0..halves.len() {
+        let (mut here, mut path) = (start, Vec::new());
+        while !used[here] {
+            used[here] = true;
+            path.push(halves[here]);
+            let (arc, forward) = halves[here];
+            let Some(ends) = arrangement.arcs[arc].ends else { break };
+            let next = leaving
+                .get(&ends[usize::from(forward)])
+                .and_then(|choices| sharpest(tree, arrangement, sheet, halves, halves[here], choices));
+            here = next.ok_or_else(|| vec![internal(tree, "a loop of edges breaks off")])?;
+        }
+        if !path.is_empty() {
+            if here != start {
+                return Err(vec![internal(tree, "a loop of edges does not return to its start")]);
+            }
+            loops.push(path);
+        }
+    }
+    Ok(loops)
+}
+
+/// Of the half-edges that leave a corner, the first clockwise from the one that came.
+fn sharpest(
+    tree: &Tree,
+    arrangement: &Arrangement,
+    (surface, outward): Sheet,
+    halves: &[(usize, bool)],
+    came: (usize, bool),
+    choices: &[usize],
+) -> Option<usize> {
+    if let [only] = choices {
+        return Some(*only);
+    }
+    let direction = |(arc, forward): (usize, bool), at_end: bool| {
+        let arc = &arrangement.arcs[arc];
+        let t = arc.span[usize::from(forward == at_end)];
+        let locus = &arrangement.curves[arc.curve];
+        (locus.at(t), locus.tangent(t) * if forward { 1.0 } else { -1.0 })
+    };
+    let (corner, arriving) = direction(came, true);
+    let normal = tree.surfaces[surface].normal_at(&corner) * if outward { 1.0 } else { -1.0 };
+    let back = -arriving;
+    let clockwise = |d: Vector3<f64>| {
+        let angle = -(normal.dot(&back.cross(&d))).atan2(back.dot(&d));
+        // Straight back comes last: a face is not left by the edge it came along.
+        if angle <= 1e-9 { angle + TAU } else { angle }
+    };
+    choices
+        .iter()
+        .copied()
+        .min_by(|a, b| clockwise(direction(halves[*a], false).1).total_cmp(&clockwise(direction(halves[*b], false).1)))
+}
+
+/// Sorts the loops of a sheet into faces: from the lowest point of each hole, the first loop met straight below bounds
+/// the same face.
+fn group(tree: &Tree, sheet: Sheet, loops: Vec<Loop>, edges: &[Edge], corners: usize) -> Result<Vec<Draft>, Faults> {
+    let surface = &tree.surfaces[sheet.0];
+    let offsets = offsets(corners, edges);
+    let rings: Vec<Ring> = loops.iter().map(|l| Ring::new(surface, sheet.1, edges, &offsets, l)).collect();
+    // The last place stands for the south pole or apex.
+    let south = rings.len();
+    let mut parent: Vec<usize> = (0..=south).collect();
+    for (i, ring) in rings.iter().enumerate().filter(|(_, r)| !r.is_outer() && r.winding != 1) {
+        let low = ring.lowest();
+        let hit = |j: usize| rings[j].below(low).map(|v| (v, j));
+        let below = (0..rings.len()).filter(|j| *j != i).filter_map(hit).max_by(|a, b| a.0.total_cmp(&b.0));
+        if below.is_none() && !matches!(surface, Surface::Cone { .. } | Surface::Sphere { .. }) {
+            return Err(vec![internal(tree, "a hole lies in no face")]);
+        }
+        let (a, b) = (root(&parent, i), root(&parent, below.map_or(south, |b| b.1)));
+        parent[a.min(b)] = a.max(b);
+    }
+    let mut faces: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    (0..south).for_each(|i| faces.entry(root(&parent, i)).or_default().push(i));
+    faces.into_values().map(|members| draft(tree, sheet, &members, &rings, &loops)).collect()
+}
+
+fn root(parent: &[usize], mut i: usize) -> usize {
+    while parent[i] != i {
+        i = parent[i];
+    }
+    i
+}
+
+fn draft(tree: &Tree, sheet: Sheet, members: &[usize], rings: &[Ring], loops: &[Loop]) -> Result<Draft, Faults> {
+    let surface = &tree.surfaces[sheet.0];
+    let winding: i32 = members.iter().map(|i| rings[*i].winding).sum();
+    let outers = members.iter().filter(|i| rings[**i].is_outer()).count();
+    let winds = members.iter().filter(|i| rings[**i].winding != 0).count();
+    let sphere = matches!(surface, Surface::Sphere { .. });
+    let sound = match (outers, winds, winding) {
+        (1, 0, _) => true,
+        (0, 2, 0) => true,
+        (0, 1, -1) => sphere || matches!(surface, Surface::Cone { .. }),
+        (0, 1, 1) | (0, 0, _) => sphere,
+        _ => false,
+    };
+    if !sound {
+        return Err(vec![internal(tree, "loops of edges do not bound a face")]);
+    }
+    let north = sphere && outers == 0 && (winding == 1 || winds == 0);
+    let mut order = members.to_vec();
+    order.sort_by_key(|i| (!rings[*i].is_outer() && rings[*i].winding != 1, *i));
+    let loops = order.iter().map(|i| loops[*i].clone()).collect();
+    Ok(Draft { sheet, loops, north, owner: (0, 0) })
+}
+
+/// Spheres that nothing cuts have no edge to be found by: one point decides.
+fn whole_spheres(tree: &Tree, drafts: &[Draft]) -> Vec<Draft> {
+    let whole = |(i, surface): (usize, &Surface)| {
+        let Surface::Sphere { centre, radius } = surface else { return None };
+        if drafts.iter().any(|d| d.sheet.0 == i) {
+            return None;
+        }
+        let p = centre + Vector3::new(0.48, 0.6, 0.64) * *radius;
+        let holds = |leaf: usize, side: f64| {
+            tree.leaves[leaf].sides.iter().all(|s| {
+                let d = if s.surface == i { side } else { tree.surfaces[s.surface].distance(&p) };
+                d * s.sense < 0.0
+            })
+        };
+        let (below, above) = (tree.inside(|l| holds(l, -1.0)), tree.inside(|l| holds(l, 1.0)));
+        let draft = Draft { sheet: (i, below), loops: Vec::new(), north: true, owner: (0, 0) };
+        (below != above).then_some(draft)
+    };
+    tree.surfaces.iter().enumerate().filter_map(whole).collect()
+}
+
+/// Leaf and side that a face is named after: the first in source order.
+fn owner(tree: &Tree, arrangement: &Arrangement, draft: &Draft) -> (usize, usize) {
+    let of_half = |&(arc, forward): &(usize, bool)| {
+        let mine = |u: &&Use| (u.surface, u.outward) == draft.sheet && u.forward == forward;
+        arrangement.arcs[arc].uses.iter().find(mine).map(|u| u.leaf)
+    };
+    let side = |leaf: usize| tree.leaves[leaf].sides.iter().position(|s| s.surface == draft.sheet.0);
+    let first = draft.loops.iter().flatten().filter_map(of_half).min();
+    let leaf = first.or_else(|| (0..tree.leaves.len()).find(|l| side(*l).is_some())).unwrap_or(0);
+    (leaf, side(leaf).unwrap_or(0))
+}
+
+/// Tells every edge its faces, the one it runs forward along first.
+fn link(edges: &mut [Edge], drafts: &[Draft]) {
+    for (face, draft) in drafts.iter().enumerate() {
+        for &(edge, forward) in draft.loops.iter().flatten() {
+            edges[edge].faces[usize::from(!forward)] = face;
+        }
+    }
+}
+
+fn fluxes(tree: &Tree, arrangement: &Arrangement, drafts: &[Draft]) -> Vec<Flux> {
+    // Seen from the middle of the part, the cones from the faces nearly cancel less.
+    let all = tree.leaves.iter().fold(Vector3::zeros(), |s, l| s + l.bounds.low.coords + l.bounds.high.coords);
+    let from = Point3::from(all / (2.0 * tree.leaves.len().max(1) as f64));
+    let flux = |draft: &Draft| {
+        let runs = draft.loops.iter().flatten().map(|&(arc, forward)| {
+            let arc = &arrangement.arcs[arc];
+            (&arrangement.curves[arc.curve], arc.span, forward)
+        });
+        measure::flux(&tree.surfaces[draft.sheet.0], draft.sheet.1, runs, draft.north, &from)
+    };
+    drafts.iter().map(flux).collect()
+}
+
+/// Volumes of the shells, voids negative, after checking Euler's number of each and that there is one body.
+fn check_shells(
+    tree: &Tree,
+    drafts: &[Draft],
+    edges: &[Edge],
+    fluxes: &[Flux],
+    vertices: &[Point3<f64>],
+) -> Result<Vec<f64>, Faults> {
+    let mut parent: Vec<usize> = (0..drafts.len()).collect();
+    for edge in edges {
+        let (a, b) = (root(&parent, edge.faces[0]), root(&parent, edge.faces[1]));
+        parent[a.min(b)] = a.max(b);
+    }
+    let mut shells: BTreeMap<usize, (f64, i64)> = BTreeMap::new();
+    for (i, draft) in drafts.iter().enumerate() {
+        let shell = shells.entry(root(&parent, i)).or_default();
+        shell.0 += fluxes[i].volume;
+        shell.1 += 2 - draft.loops.len() as i64;
+    }
+    let mut seen = vec![false; vertices.len()];
+    for edge in edges {
+        let shell = shells.entry(root(&parent, edge.faces[0])).or_default();
+        for corner in edge.ends.iter().flatten() {
+            shell.1 += i64::from(!std::mem::replace(&mut seen[*corner], true));
+        }
+        shell.1 -= i64::from(edge.ends[0].is_some());
+    }
+    if let Some((_, euler)) = shells.values().find(|(_, euler)| euler % 2 != 0 || *euler > 2) {
+        return Err(vec![internal(tree, &format!("a shell has Euler number {euler}"))]);
+    }
+    let volumes: Vec<f64> = shells.values().map(|s| s.0).collect();
+    in_one_piece(tree, &volumes)?;
+    Ok(volumes)
+}
+
+fn in_one_piece(tree: &Tree, volumes: &[f64]) -> Result<(), Faults> {
+    let mut bodies: Vec<f64> = volumes.iter().copied().filter(|v| *v > 0.0).collect();
+    bodies.sort_by(f64::total_cmp);
+    match bodies.len() {
+        0 => Err(vec![internal(tree, "it encloses no volume")]),
+        1 => Ok(()),
+        n => {
+            let message = format!("`{}` falls into {n} bodies; the smallest is {:.3} mm³", tree.part.name, bodies[0]);
+            Err(vec![Diagnostic::error("E0405", tree.part.span, message)])
+        }
+    }
+}
+
+/// Forgets surfaces without a face.
+fn drop_unused_surfaces(mut solid: Solid) -> Solid {
+    let mut place = vec![None; solid.surfaces.len()];
+    let mut kept = Vec::new();
+    for face in &mut solid.faces {
+        let slot = &mut place[face.surface];
+        face.surface = *slot.get_or_insert_with(|| {
+            kept.push(solid.surfaces[face.surface].clone());
+            kept.len() - 1
+        });
+    }
+    solid.surfaces = kept;
+    solid
+}

@@ -1,0 +1,202 @@
+//! Triangles of a solid: constrained Delaunay in each face's own plane, over the samples the edges share.
+//!
+//! In: a [`Solid`] without triangles. Out: a [`TriMesh`], or the face that could not be filled. Neighbouring faces use
+//! the same samples of their common edge, so the mesh is closed without any joining; a seam uses no point of its own
+//! but on a sphere, where both its sides share them.
+
+use super::ring::{Grid, Node, Outline, Ring, offsets};
+use super::{Face, Quality, Solid, Surface, TriMesh};
+use nalgebra::Point3;
+use spade::handles::FixedVertexHandle;
+use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
+use std::collections::HashMap;
+
+/// Triangulates every face; the error is the index of a face whose outline crosses itself.
+pub(super) fn triangulate(solid: &Solid, quality: &Quality) -> Result<TriMesh, usize> {
+    let offsets = offsets(solid.vertices.len(), &solid.edges);
+    let mut mesh = TriMesh { positions: positions(solid), ..TriMesh::default() };
+    for face in 0..solid.faces.len() {
+        let patch = patch(solid, face, &offsets, quality, &mut mesh.positions).ok_or(face)?;
+        fill(solid, face, &patch, &mut mesh).ok_or(face)?;
+    }
+    Ok(mesh)
+}
+
+/// Corners, then the inner samples of every edge, as [`offsets`] counts them.
+fn positions(solid: &Solid) -> Vec<Point3<f64>> {
+    let mut positions = solid.vertices.clone();
+    for edge in &solid.edges {
+        let last = edge.samples.len() - 1;
+        let first = usize::from(edge.ends[0].is_some());
+        positions.extend_from_slice(&edge.samples[first..last]);
+    }
+    positions
+}
+
+/// A face's outline and the nodes inside it.
+struct Patch {
+    outline: Outline,
+    inner: Vec<Node>,
+}
+
+fn patch(
+    solid: &Solid,
+    face: usize,
+    offsets: &[u32],
+    quality: &Quality,
+    positions: &mut Vec<Point3<f64>>,
+) -> Option<Patch> {
+    let surface = solid.surface(face);
+    let mut fresh = |uv: [f64; 2]| {
+        positions.push(surface.at(uv));
+        positions.len() as u32 - 1
+    };
+    let rings = rings(solid, face, offsets);
+    let outline =
+        Outline::new(surface, &rings, &mut Grid { steps: steps(surface, &rings, quality), fresh: &mut fresh })?;
+    let inner = inner_nodes(surface, &outline, quality, &mut fresh);
+    Some(Patch { outline, inner })
+}
+
+pub(super) fn rings(solid: &Solid, face: usize, offsets: &[u32]) -> Vec<Ring> {
+    let Face { outward, loops, .. } = &solid.faces[face];
+    loops.iter().map(|l| Ring::new(solid.surface(face), *outward, &solid.edges, offsets, l)).collect()
+}
+
+/// Nodes for a whole turn where a face has no edge to take them from.
+fn steps(surface: &Surface, rings: &[Ring], quality: &Quality) -> usize {
+    match surface {
+        Surface::Sphere { radius, .. } => quality.steps(*radius),
+        _ => rings.iter().map(|r| r.nodes.len()).max().unwrap_or(1),
+    }
+}
+
+/// A lattice of nodes inside a sphere's face, which is curved both ways; other faces need none.
+fn inner_nodes(
+    surface: &Surface,
+    outline: &Outline,
+    quality: &Quality,
+    fresh: &mut dyn FnMut([f64; 2]) -> u32,
+) -> Vec<Node> {
+    let Surface::Sphere { radius, .. } = surface else { return Vec::new() };
+    let steps = quality.steps(*radius);
+    let step = std::f64::consts::TAU * radius / steps as f64;
+    let border: Vec<[f64; 2]> =
+        outline.outer.iter().chain(outline.holes.iter().flatten()).map(|n| flat(surface, 1.0, n.uv)).collect();
+    let reach = border.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |r, p| [r[0].min(p[0]), r[1].max(p[0])]);
+    let mut nodes = Vec::new();
+    for row in 1..steps / 2 {
+        let latitude = row as f64 * step - radius * std::f64::consts::FRAC_PI_2;
+        let mut column = (reach[0] / step).ceil() as i64;
+        while column as f64 * step < reach[1] {
+            let p = [column as f64 * step, latitude];
+            let uv = [p[0], radius * (1.0 + (latitude / radius).sin())];
+            let apart = |q: &[f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]) > step / 2.0;
+            if outline.holds(uv) && border.iter().all(apart) {
+                nodes.push(Node { uv, id: fresh(uv) });
+            }
+            column += 1;
+        }
+    }
+    nodes
+}
+
+/// The plane that a face is triangulated in: the chart with v stretched to distance along the surface, so that circles
+/// about the axis and rulings stay straight and triangles keep their shape.
+fn flat(surface: &Surface, girth: f64, uv: [f64; 2]) -> [f64; 2] {
+    match surface {
+        Surface::Plane { .. } | Surface::Cylinder { .. } => uv,
+        Surface::Cone { half_angle, .. } => [uv[0] * girth, slant(*half_angle, uv[1])],
+        Surface::Sphere { radius, .. } => [uv[0], radius * (uv[1] / radius - 1.0).clamp(-1.0, 1.0).asin()],
+    }
+}
+
+/// Distance from the apex of a cone at chart coordinate `v`.
+fn slant(half_angle: f64, v: f64) -> f64 {
+    (2.0 * v.max(0.0) / half_angle.sin()).sqrt()
+}
+
+/// Mean radius of a cone's face: what a radian of turn is worth in mm. One for the others, whose charts are in mm.
+fn girth(surface: &Surface, outline: &Outline) -> f64 {
+    let Surface::Cone { half_angle, .. } = surface else { return 1.0 };
+    let sum: f64 = outline.outer.iter().map(|n| slant(*half_angle, n.uv[1])).sum();
+    sum / outline.outer.len() as f64 * half_angle.sin()
+}
+
+/// Adds the triangles of one face.
+fn fill(solid: &Solid, face: usize, patch: &Patch, mesh: &mut TriMesh) -> Option<()> {
+    let surface = solid.surface(face);
+    let mut nodes: Vec<Node> = Vec::new();
+    let mut border: Vec<[usize; 2]> = Vec::new();
+    for ring in std::iter::once(&patch.outline.outer).chain(&patch.outline.holes) {
+        let start = nodes.len();
+        nodes.extend_from_slice(ring);
+        let end = nodes.len();
+        border.extend((start..end).map(|i| [i, if i + 1 < end { i + 1 } else { start }]));
+    }
+    nodes.extend_from_slice(&patch.inner);
+    let girth = girth(surface, &patch.outline);
+    let points: Vec<[f64; 2]> = nodes.iter().map(|n| flat(surface, girth, n.uv)).collect();
+    for corners in delaunay(&points, &border)? {
+        add_triangle(solid, face, corners.map(|i| nodes[i]), mesh);
+    }
+    Some(())
+}
+
+/// Adds a triangle given counter-clockwise in the chart; one with two corners at a pole is no triangle.
+fn add_triangle(solid: &Solid, face: usize, [a, b, c]: [Node; 3], mesh: &mut TriMesh) {
+    if a.id == b.id || b.id == c.id || c.id == a.id {
+        return;
+    }
+    let Face { outward, .. } = solid.faces[face];
+    let corners = if outward { [a, b, c] } else { [a, c, b] };
+    let sense = if outward { 1.0 } else { -1.0 };
+    mesh.triangles.push(corners.map(|n| n.id));
+    mesh.normals.push(corners.map(|n| solid.surface(face).chart_normal(n.uv) * sense));
+    mesh.faces.push(face as u32);
+}
+
+/// Triangles, counter-clockwise, to the left of the border; `None` when it crosses itself.
+fn delaunay(points: &[[f64; 2]], border: &[[usize; 2]]) -> Option<Vec<[usize; 3]>> {
+    let (firsts, place) = welded(points);
+    let border: Vec<[usize; 2]> = border.iter().map(|e| e.map(|i| place[i])).filter(|[a, b]| a != b).collect();
+    let vertices: Vec<Point2<f64>> = firsts.iter().map(|i| Point2::new(points[*i][0], points[*i][1])).collect();
+    let mut crossed = false;
+    let cdt: ConstrainedDelaunayTriangulation<Point2<f64>> =
+        ConstrainedDelaunayTriangulation::try_bulk_load_cdt(vertices, border.clone(), |_| crossed = true).ok()?;
+    if crossed || cdt.num_vertices() != firsts.len() {
+        return None;
+    }
+    let mut open = Vec::new();
+    for [a, b] in border.iter().map(|e| e.map(FixedVertexHandle::from_index)) {
+        open.push(cdt.get_edge_from_neighbors(a, b)?.face().fix());
+    }
+    let mut seen = vec![false; cdt.num_all_faces()];
+    let mut triangles = Vec::new();
+    while let Some(face) = open.pop() {
+        if std::mem::replace(&mut seen[face.index()], true) {
+            continue;
+        }
+        let face = cdt.face(face).as_inner()?;
+        triangles.push(face.vertices().map(|v| firsts[v.fix().index()]));
+        let across = face.adjacent_edges().into_iter().filter(|e| !e.is_constraint_edge());
+        open.extend(across.map(|e| e.rev().face().fix()));
+    }
+    Some(triangles)
+}
+
+/// Points that are equal to the last bit made one: the first of each, and which of those each point is.
+fn welded(points: &[[f64; 2]]) -> (Vec<usize>, Vec<usize>) {
+    let mut known: HashMap<[u64; 2], usize> = HashMap::new();
+    let mut firsts = Vec::new();
+    let mut place = Vec::with_capacity(points.len());
+    for (i, p) in points.iter().enumerate() {
+        // Adding zero makes one zero of the two.
+        let at = *known.entry(p.map(|c| (c + 0.0).to_bits())).or_insert_with(|| {
+            firsts.push(i);
+            firsts.len() - 1
+        });
+        place.push(at);
+    }
+    (firsts, place)
+}
