@@ -100,7 +100,7 @@ fn non_manifold(tree: &Tree, arrangement: &Arrangement, arc: &Arc) -> Diagnostic
     let p = arrangement.curves[arc.curve].at((arc.span[0] + arc.span[1]) / 2.0);
     let message = format!("{} of `{}` touch along a line only", names.join(" and "), tree.part.name);
     let spans = leaves.iter().map(|l| tree.part.features[tree.leaves[*l].feature].span);
-    let last = spans.clone().last().unwrap_or(tree.part.span);
+    let last = spans.clone().next_back().unwrap_or(tree.part.span);
     let fault = Diagnostic::error("E0407", last, message)
         .note(format!("near ({:.3}, {:.3}, {:.3}) mm; let them overlap or keep them apart", p.x, p.y, p.z));
     spans.take(leaves.len().saturating_sub(1)).fold(fault, |f, span| f.also(span, "touches it"))

@@ -109,7 +109,7 @@ fn about(surface: &Surface, centre: &Point3<f64>, axis: &nalgebra::Unit<Vector3<
 }
 
 /// Panels of an arc, each integrated by Gauss and Legendre's rule of five points.
-const PANELS: usize = 32;
+const PANELS: usize = 256;
 const GAUSS: [(f64, f64); 5] = [
     (0.0, 0.568_888_888_888_888_9),
     (-0.538_469_310_105_683, 0.478_628_670_499_366_5),
