@@ -93,6 +93,9 @@ const LARGEST: f64 = 4.0;
 const WIDEST_TURN: f64 = 40.0 * TAU / 360.0;
 /// Turns are tried in steps of this (rad), and the first that lifts the part is found to within a sixteenth of it.
 const TURN_STEP: f64 = 4.0 * TAU / 360.0;
+/// Side of a cell (mm) in the search for turns and in the pose a turn leads to.
+const COARSE: f64 = 0.4;
+const FINE: f64 = 0.2;
 /// Holes closer to the turn axis than this (mm) do not stop a turn.
 const ON_AXIS: f64 = 0.5;
 /// Directions that differ by less than this sine are parallel.
@@ -205,7 +208,7 @@ fn turn(
     }
     let stands = |c: &usize| *c == 0 || rests(liaison, *c, direction);
     let firm: Vec<usize> = (0..liaison.components).filter(|c| *c != component).filter(stands).collect();
-    let bed = bed(component, &axis, &firm, solids, poses);
+    let bed = bed(component, &axis, COARSE, &firm, solids, poses);
     let lifted = |angle: f64| {
         let landing = bed.set_down(&solids[component].mesh, &(axis.turn(angle) * poses[component]));
         landing.lie(false).is_some_and(|l| l.height >= SMALLEST)
@@ -263,14 +266,21 @@ fn period(seats: &[Vector3<f64>]) -> f64 {
     turns.filter(maps).map(|t| t.angle()).filter(|a| *a > PARALLEL).fold(TAU, f64::min)
 }
 
-fn bed(component: usize, axis: &Axis, firm: &[usize], solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Bed {
+fn bed(
+    component: usize,
+    axis: &Axis,
+    cell: f64,
+    firm: &[usize],
+    solids: &[Arc<Solid>],
+    poses: &[Isometry3<f64>],
+) -> Bed {
     let positions = solids[component].mesh.positions.iter();
     let radius = positions.map(|p| axis.offset(&(poses[component] * p)).norm()).fold(0.0, f64::max);
     let others: Vec<(usize, bool)> =
         (0..solids.len()).filter(|c| *c != component).map(|c| (c, firm.contains(&c))).collect();
     let frame = super::columns::Frame::along(axis.direction);
     let [u, v, _] = frame.coordinates(&axis.point);
-    Bed::new(axis.direction, [u, v], radius, &others, solids, poses)
+    Bed::new(axis.direction, [u, v], radius, cell, &others, solids, poses)
 }
 
 /// The turns of one sign that lift the part, from the first on (rad, low to high).
@@ -294,7 +304,7 @@ fn turned(mode: &ErrorMode, u: [f64; 3], solids: &[Arc<Solid>], poses: &[Isometr
     let axis = Axis { point: Point3::from(*point), direction: Unit::new_normalize(Vector3::from(*direction)) };
     let angle = pick(ranges, u[0]);
     let pose = axis.turn(angle) * poses[mode.component];
-    let bed = bed(mode.component, &axis, firm, solids, poses);
+    let bed = bed(mode.component, &axis, FINE, firm, solids, poses);
     let landing = bed.set_down(&solids[mode.component].mesh, &pose);
     let on_all = landing.lie(false);
     let on_firm = landing.lie(true);

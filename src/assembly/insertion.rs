@@ -10,8 +10,9 @@ use super::contact::{Contact, ContactKind};
 use super::liaison::Liaison;
 use super::place::place;
 use crate::design::model::Design;
-use crate::solid::Solid;
+use crate::solid::{Solid, TriMesh};
 use nalgebra::{Isometry3, Unit, Vector3};
+use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -45,7 +46,7 @@ impl Insertion {
 /// Bodies that enter each other less than this (mm) along the direction do not block.
 const DEPTH_TOLERANCE: f64 = 0.02;
 /// Cells across the region two bodies share, and the least side of a cell (mm).
-const CELLS_ACROSS: f64 = 160.0;
+const CELLS_ACROSS: f64 = 100.0;
 const FINEST_CELL: f64 = 0.05;
 /// Directions tried, those with the largest contacts first: a bound on the time spent.
 const MOST_AXES: usize = 6;
@@ -132,7 +133,6 @@ fn holds(liaison: &Liaison, direction: Unit<Vector3<f64>>, a: usize, b: usize) -
 
 /// How the bodies meet along one direction.
 pub(crate) struct Meetings {
-    bodies: Vec<(Arc<Solid>, Vec<[f64; 3]>, Extent)>,
     /// `way[a][b]`: b stands in the way of a.
     way: Vec<Vec<bool>>,
     pub entering: Vec<Entering>,
@@ -148,39 +148,58 @@ pub(crate) struct Entering {
 }
 
 impl Meetings {
-    pub fn new(direction: Unit<Vector3<f64>>, solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Self {
+    pub fn new<'a>(direction: Unit<Vector3<f64>>, solids: &'a [Arc<Solid>], poses: &[Isometry3<f64>]) -> Self {
         let frame = Frame::along(direction);
-        let body = |(solid, pose): (&Arc<Solid>, &Isometry3<f64>)| {
+        let body = |(solid, pose): (&'a Arc<Solid>, &Isometry3<f64>)| {
             let points = project(&solid.mesh, pose, &frame);
-            let extent = Extent::of(&points);
-            (solid.clone(), points, extent)
+            Body { mesh: &solid.mesh, extent: Extent::of(&points), points }
         };
-        let bodies: Vec<_> = solids.iter().zip(poses).map(body).collect();
+        let bodies: Vec<Body> = solids.iter().zip(poses).map(body).collect();
         let n = bodies.len();
-        let mut meetings = Meetings { bodies, way: vec![vec![false; n]; n], entering: Vec::new() };
-        for a in 0..n {
-            for b in a + 1..n {
-                meetings.compare(a, b);
-            }
+        let pairs: Vec<[usize; 2]> = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b])).collect();
+        let met: Vec<Option<Meeting>> = pairs.par_iter().map(|pair| meeting(pair.map(|i| &bodies[i]))).collect();
+        let mut meetings = Meetings { way: vec![vec![false; n]; n], entering: Vec::new() };
+        for ([a, b], meeting) in pairs.into_iter().zip(met) {
+            let Some(meeting) = meeting else { continue };
+            meetings.way[a][b] = meeting.second_above;
+            meetings.way[b][a] = meeting.first_above;
+            meetings.entering.extend(meeting.depth.map(|depth| Entering { a, b, depth }));
         }
         meetings
     }
+}
 
-    fn compare(&mut self, a: usize, b: usize) {
-        let region = self.bodies[a].2.common(&self.bodies[b].2);
-        let size = [0, 1].map(|i| region.high[i] - region.low[i]);
-        if size[0] <= 0.0 || size[1] <= 0.0 {
-            return;
-        }
-        let cell = (size[0].max(size[1]) / CELLS_ACROSS).max(FINEST_CELL);
-        let grid = Grid::over(&region, cell);
-        let [p, q] = [a, b].map(|i| Columns::new(&self.bodies[i].0.mesh, &self.bodies[i].1, &grid));
-        self.way[a][b] = any_wide(&grid, |c| above(&p, &q, c));
-        self.way[b][a] = any_wide(&grid, |c| above(&q, &p, c));
-        if let Some(depth) = depth(&p, &q, &grid) {
-            self.entering.push(Entering { a, b, depth });
-        }
+/// A body in the coordinates of the direction.
+struct Body<'a> {
+    mesh: &'a TriMesh,
+    points: Vec<[f64; 3]>,
+    extent: Extent,
+}
+
+/// How two bodies meet along the direction.
+struct Meeting {
+    /// The second has material above where the first begins, and the other way round.
+    second_above: bool,
+    first_above: bool,
+    /// How far they enter each other (mm).
+    depth: Option<f64>,
+}
+
+/// `None` for bodies that pass each other by.
+fn meeting(bodies: [&Body; 2]) -> Option<Meeting> {
+    let region = bodies[0].extent.common(&bodies[1].extent);
+    let size = [0, 1].map(|i| region.high[i] - region.low[i]);
+    if size[0] <= 0.0 || size[1] <= 0.0 {
+        return None;
     }
+    let cell = (size[0].max(size[1]) / CELLS_ACROSS).max(FINEST_CELL);
+    let grid = Grid::over(&region, cell);
+    let [p, q] = bodies.map(|b| Columns::new(b.mesh, &b.points, &grid));
+    Some(Meeting {
+        second_above: any_wide(&grid, |c| above(&p, &q, c)),
+        first_above: any_wide(&grid, |c| above(&q, &p, c)),
+        depth: if region.high[2] - region.low[2] > DEPTH_TOLERANCE { depth(&p, &q, &grid) } else { None },
+    })
 }
 
 /// Whether q has material above where p begins.

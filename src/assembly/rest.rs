@@ -60,18 +60,19 @@ pub(crate) struct Bed {
     loose: Vec<(usize, Vec<f64>)>,
 }
 
-/// Side of a cell (mm), and the most cells across.
-const CELL: f64 = 0.2;
+/// Most cells across a bed, whatever the side of a cell that is asked for.
 const MOST_CELLS: f64 = 400.0;
 /// A part that would have to tilt more than this (rad) slides off.
 const STEEPEST: f64 = 0.35;
 
 impl Bed {
-    /// The bed for a part that stays within `radius` (mm) of `centre`. Each body: its component, whether it stands firm.
+    /// The bed for a part that stays within `radius` of `centre`, in cells of side `cell` (mm). Each body: its component,
+    /// whether it stands firm.
     pub fn new(
         direction: Unit<Vector3<f64>>,
         centre: [f64; 2],
         radius: f64,
+        cell: f64,
         bodies: &[(usize, bool)],
         solids: &[Arc<Solid>],
         poses: &[Isometry3<f64>],
@@ -79,7 +80,7 @@ impl Bed {
         let frame = Frame::along(direction);
         let low = [centre[0] - radius, centre[1] - radius, 0.0];
         let high = [centre[0] + radius, centre[1] + radius, 0.0];
-        let grid = Grid::over(&Extent { low, high }, (2.0 * radius / MOST_CELLS).max(CELL));
+        let grid = Grid::over(&Extent { low, high }, (2.0 * radius / MOST_CELLS).max(cell));
         let nothing = vec![f64::NEG_INFINITY; grid.cells()];
         let mut bed = Bed { frame, grid, all: nothing.clone(), firm: nothing, loose: Vec::new() };
         for (component, firm) in bodies {
