@@ -144,26 +144,24 @@ impl<'a> Tight<'a> {
             format!("at MMC {left:.4} mm of clearance is left, but placement allows ±{:.4} mm", self.reach)
         };
         let warning = Diagnostic::warning("W0502", component.span, message).label(label);
-        match self.remedy() {
+        match self.remedy(design) {
             Some(help) => warning.help(help),
             None => warning,
         }
     }
 
     /// The widest zone that keeps clear, where one axis alone is to blame.
-    fn remedy(&self) -> Option<String> {
+    fn remedy(&self, design: &Design) -> Option<String> {
         let [slip] = self.slips.as_slice() else { return None };
         let share = self.contact.gap_range[0] / 2.0 / slip.shift.norm();
-        let width = slip.half_width * share;
+        let pose = &design.components[slip.component].pose;
+        let (expr, scale, unit) = match slip.axis {
+            axis @ 0..3 => (&pose.t[axis], 1.0, ""),
+            axis => (&pose.r[axis - 3], 1f64.to_degrees(), " deg"),
+        };
+        let nominal = (expr.eval(&design.nominal()) * scale * 1e6).round() / 1e6 + 0.0;
         let axis = ["x", "y", "z", "rx", "ry", "rz"][slip.axis];
-        if share <= 0.0 {
-            return None;
-        }
-        Some(if slip.axis < 3 {
-            format!("{axis} = 0 ±{}", rounded_down(width))
-        } else {
-            format!("{axis} = 0 ±{} deg", rounded_down(width.to_degrees()))
-        })
+        (share > 0.0).then(|| format!("{axis} = {nominal} ±{}{unit}", rounded_down(slip.half_width * share * scale)))
     }
 }
 

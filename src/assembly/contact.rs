@@ -71,8 +71,18 @@ impl Contact {
     pub fn other(&self, component: usize) -> usize {
         if self.a.component == component { self.b.component } else { self.a.component }
     }
+
+    /// From where to where along a direction the contact holds sideways (mm from the assembly's origin): cylinders with
+    /// that axis only.
+    pub fn sideways_span(&self, direction: Unit<Vector3<f64>>) -> Option<[f64; 2]> {
+        let parallel = self.kind == ContactKind::Cylinder && self.direction.cross(&direction).norm() < ALONG;
+        let [low, high] = self.span;
+        parallel.then(|| if self.direction.dot(&direction) > 0.0 { [low, high] } else { [-high, -low] })
+    }
 }
 
+/// An axis is along a direction when the sine of their angle is below this.
+const ALONG: f64 = 1e-3;
 /// Faces closer than this touch (mm), whatever the placement zones say.
 const TOUCH: f64 = 1e-3;
 /// Normals and axes are parallel when the sine of their angle is below this.

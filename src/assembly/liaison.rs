@@ -6,6 +6,7 @@
 use super::contact::{Contact, ContactKind, FaceRef, Fit};
 use crate::design::model::Design;
 use crate::solid::Solid;
+use nalgebra::{Unit, Vector3};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -46,7 +47,20 @@ impl Liaison {
         let set: BTreeSet<FaceRef> = self.of(component).filter_map(|c| c.on(component)).collect();
         set.into_iter().collect()
     }
+
+    /// Whether a component stands on another, seen along its removal direction.
+    pub fn rests(&self, component: usize, direction: Unit<Vector3<f64>>) -> bool {
+        self.of(component).any(|c| match c.kind {
+            ContactKind::Cylinder => false,
+            ContactKind::Plane if c.a.component == component => c.direction.dot(&direction) < -FACING,
+            ContactKind::Plane => c.direction.dot(&direction) > FACING,
+            ContactKind::Cone | ContactKind::Sphere => true,
+        })
+    }
 }
+
+/// A plane bears along a direction when the cosine between them exceeds this.
+const FACING: f64 = 1e-3;
 
 /// The diagram in the user's names, for goldens and `--emit liaison`.
 #[derive(Debug, Clone, PartialEq, Serialize)]

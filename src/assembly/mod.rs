@@ -9,6 +9,7 @@ pub mod fault;
 pub mod insertion;
 pub mod liaison;
 pub mod place;
+pub mod turn;
 
 mod check;
 mod columns;
