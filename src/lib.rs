@@ -22,4 +22,7 @@ pub mod variation;
 #[cfg(feature = "compile")]
 pub mod view;
 
+#[cfg(feature = "compile")]
+pub mod train;
+
 pub mod runtime;
