@@ -194,8 +194,11 @@ impl Triangle {
 
     /// Bounds of `u` in the triangle over all `v` between the two given; low above high where there are none.
     fn across(&self, [v0, v1]: [f64; 2]) -> [f64; 2] {
-        let low = self.left.iter().fold(self.u[0], |low, [p, q]| low.max(p + (q * v0).min(q * v1)));
-        let high = self.right.iter().fold(self.u[1], |high, [p, q]| high.min(p + (q * v0).max(q * v1)));
+        let [mut low, mut high] = self.u;
+        for ([p, q], [r, s]) in self.left.iter().zip(&self.right) {
+            low = larger(low, p + smaller(q * v0, q * v1));
+            high = smaller(high, r + larger(s * v0, s * v1));
+        }
         [low, high]
     }
 
@@ -219,6 +222,15 @@ impl Triangle {
 /// The line u = p + q v on which an edge function vanishes, moved outwards (`side`: 1 left, -1 right) by its rounding.
 fn line([a, b, c]: Vec3, side: f64) -> [f64; 2] {
     [-c / a - side * ROUNDING * (c.abs() + b.abs()) / a.abs(), -b / a]
+}
+
+/// One instruction, where `f64::max` takes five to honour NaN: this is the innermost loop of the search for a camera.
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
 
 #[cfg(test)]
