@@ -3,6 +3,8 @@
 #[cfg(feature = "compile")]
 pub mod diag;
 #[cfg(feature = "compile")]
+pub mod iso;
+#[cfg(feature = "compile")]
 pub mod rng;
 #[cfg(feature = "compile")]
 pub mod units;
@@ -17,6 +19,8 @@ pub mod render;
 pub mod scene;
 #[cfg(feature = "compile")]
 pub mod solid;
+#[cfg(feature = "compile")]
+pub mod syntax;
 #[cfg(feature = "compile")]
 pub mod variation;
 #[cfg(feature = "compile")]

@@ -1,3 +1,19 @@
-//! Stage 2: a parsed file becomes a design: names, units and limits resolved and checked.
+//! Stage 2: syntax trees become a design: names, units and limits resolved and checked.
+//!
+//! In: the name of a spec and a way to read texts. Out: [`model::Design`] with everything in mm and rad, or what is wrong
+//! with the spec. Never builds a solid and never opens a file itself.
 
+mod assemble;
+mod fields;
+mod load;
+mod material;
+mod measure;
 pub mod model;
+mod part;
+mod pattern;
+mod scope;
+mod sense;
+mod station;
+mod task;
+
+pub use load::{Loaded, load};

@@ -164,8 +164,12 @@ pub struct FeatureCopy {
     pub pose: PoseExpr,
 }
 
+/// One piece of a part. A part placed several times has an entry here for every piece, because pieces differ: the entries
+/// share a name, and the dimensions of each carry the component's (`alignment_pin[2].foot_step.d`). The dimensions of a part
+/// placed once carry the part's (`gear.bore.d`). A `let` outside all parts stays one dimension, shared by whatever uses it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Part {
+    /// As in the spec; the same for all pieces of a part.
     pub name: String,
     /// Index into [`Design::materials`].
     pub material: usize,

@@ -2,6 +2,8 @@
 //!
 //! A stage returns what it could make and a list of these. Nothing here prints; `cli` renders them.
 
+pub mod suggest;
+
 use serde::Serialize;
 
 /// A stretch of bytes in one source file.

@@ -1,0 +1,394 @@
+//! `assembly`: which piece of which part stands where.
+//!
+//! In: `root` and `place` statements. Out: components, parents before their children, each with its part, the frame it
+//! is placed in and its pose with its tolerance zone.
+
+use super::fields::Fields;
+use super::measure::General;
+use super::model::{Component, Expr, Part, PoseExpr};
+use super::part::PartSource;
+use super::scope::{Remark, Resolver};
+use crate::diag::suggest::nearest;
+use crate::diag::{Diagnostic, Span};
+use crate::syntax::ast::{self, Stmt, Value};
+use crate::units::{Quantity, Range};
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+/// More components than this are a slip of the pen.
+const MAX_COMPONENTS: usize = 1000;
+
+const AXES: [(&str, Quantity); 6] = [
+    ("x", Quantity::Length),
+    ("y", Quantity::Length),
+    ("z", Quantity::Length),
+    ("rx", Quantity::Angle),
+    ("ry", Quantity::Angle),
+    ("rz", Quantity::Angle),
+];
+
+/// The parts and materials that placements refer to.
+pub struct Catalogue<'a> {
+    pub parts: BTreeMap<&'a str, PartSource<'a>>,
+    pub materials: BTreeMap<&'a str, usize>,
+}
+
+/// The assembly as built: one part per component, so that every piece has draws of its own.
+#[derive(Default)]
+pub struct Assembled {
+    pub parts: Vec<Part>,
+    pub components: Vec<Component>,
+    /// Components by the name they were placed under: `alignment_pin` names three.
+    pub groups: BTreeMap<String, Vec<usize>>,
+    /// Names of the parts that were placed.
+    pub placed: Vec<String>,
+}
+
+/// What one placement stands on: a component and the frame of one of its features.
+struct Seat {
+    component: usize,
+    frame: PoseExpr,
+}
+
+impl Resolver {
+    pub fn assemble(&mut self, body: &ast::Body, span: Span, catalogue: &Catalogue) -> Assembled {
+        let mut built = Assembled::default();
+        let places: Vec<&ast::Place> = body.lines.iter().filter_map(as_place).collect();
+        let counts = pieces(body);
+        self.root(body, span, catalogue, &counts, &mut built);
+        if built.components.is_empty() {
+            return built;
+        }
+        self.unique_names(body);
+        let mut waiting = places;
+        // Placements may be written in any order: each round builds those whose support stands.
+        while !waiting.is_empty() {
+            let (ready, rest): (Vec<_>, Vec<_>) =
+                waiting.into_iter().partition(|place| built.groups.contains_key(&place.on.segments[0].name.text));
+            if ready.is_empty() {
+                self.unsupported(&rest, &built);
+                break;
+            }
+            ready.iter().for_each(|place| self.place(place, catalogue, &counts, &mut built));
+            waiting = rest;
+        }
+        built
+    }
+
+    fn root(
+        &mut self,
+        body: &ast::Body,
+        span: Span,
+        catalogue: &Catalogue,
+        counts: &BTreeMap<&str, u64>,
+        built: &mut Assembled,
+    ) {
+        let roots: Vec<_> = body.lines.iter().filter_map(as_root).collect();
+        let Some((name, part)) = roots.first() else {
+            self.report(Diagnostic::error("E0207", span, "the assembly has no root").label("`root` is missing").help(
+                format!(
+                    "write `root {}`: the part on which the others are placed",
+                    catalogue.parts.keys().next().copied().unwrap_or("plate")
+                ),
+            ));
+            return;
+        };
+        for (again, _) in &roots[1..] {
+            self.duplicate("root", again, name.span);
+        }
+        let wanted = part.unwrap_or(name);
+        let identity = Seat { component: usize::MAX, frame: PoseExpr::identity() };
+        if let Some(part) = self.piece(wanted, &name.text, catalogue, counts, built) {
+            let pose = (PoseExpr::identity(), [false; 6]);
+            built.groups.insert(name.text.clone(), vec![0]);
+            built.components.push(component(name.text.clone(), part, identity, pose, name.span));
+        }
+    }
+
+    fn unique_names(&mut self, body: &ast::Body) {
+        let mut seen: BTreeMap<&str, Span> = BTreeMap::new();
+        for line in &body.lines {
+            let name = match &line.stmt {
+                Stmt::Place(place) => &place.name,
+                Stmt::Root { name, .. } => name,
+                _ => continue,
+            };
+            match seen.get(name.text.as_str()) {
+                Some(first) if matches!(line.stmt, Stmt::Place(_)) => {
+                    let first = *first;
+                    self.duplicate("component", name, first);
+                }
+                _ => {
+                    seen.insert(&name.text, name.span);
+                }
+            }
+        }
+    }
+
+    fn place(
+        &mut self,
+        place: &ast::Place,
+        catalogue: &Catalogue,
+        counts: &BTreeMap<&str, u64>,
+        built: &mut Assembled,
+    ) {
+        let Some(seats) = self.seats(&place.on, built) else { return };
+        let count = place.count.as_ref().map_or(1, |c| c.value);
+        if count != seats.len() as u64 {
+            return self.counts_differ(place, count, seats.len());
+        }
+        if built.components.len() + seats.len() > MAX_COMPONENTS {
+            let message = format!("more than {MAX_COMPONENTS} components");
+            return self.report(Diagnostic::error("E0212", place.name.span, message).label("too many components"));
+        }
+        let wanted = place.part.as_ref().unwrap_or(&place.name);
+        for (i, seat) in seats.into_iter().enumerate() {
+            let name =
+                if place.count.is_some() { format!("{}[{}]", place.name.text, i + 1) } else { place.name.text.clone() };
+            let Some(part) = self.piece(wanted, &name, catalogue, counts, built) else { return };
+            let pose = self.pose(place, &name);
+            built.groups.entry(place.name.text.clone()).or_default().push(built.components.len());
+            built.components.push(component(name, part, seat, pose, place.name.span));
+        }
+    }
+
+    /// A part for one component; dimensions carry the component's name when the part is placed more than once.
+    fn piece(
+        &mut self,
+        wanted: &ast::Name,
+        component: &str,
+        catalogue: &Catalogue,
+        counts: &BTreeMap<&str, u64>,
+        built: &mut Assembled,
+    ) -> Option<usize> {
+        let Some(source) = catalogue.parts.get(wanted.text.as_str()) else {
+            self.unknown_part(wanted, catalogue);
+            return None;
+        };
+        let several = counts.get(wanted.text.as_str()).is_some_and(|&n| n > 1);
+        let path = if several { component } else { &wanted.text };
+        let part = self.part(*source, path, &catalogue.materials);
+        built.parts.push(part);
+        built.placed.push(wanted.text.clone());
+        Some(built.parts.len() - 1)
+    }
+
+    fn unknown_part(&mut self, wanted: &ast::Name, catalogue: &Catalogue) {
+        let known = self.kinds.get(&wanted.text).copied();
+        let diagnostic = match known {
+            Some(kind) => {
+                Diagnostic::error("E0203", wanted.span, format!("expected a part, `{}` is a {kind}", wanted.text))
+                    .label(format!("a {kind}"))
+            }
+            None => Diagnostic::error("E0201", wanted.span, format!("no part is named `{}`", wanted.text))
+                .label("unknown part"),
+        };
+        let names = catalogue.parts.keys().copied();
+        self.report(match nearest(&wanted.text, names.clone()) {
+            Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+            None => diagnostic.help(format!("parts: {}", names.collect::<Vec<_>>().join(", "))),
+        });
+    }
+
+    /// Where copies placed on `path` stand, in order.
+    fn seats(&mut self, path: &ast::Path, built: &Assembled) -> Option<Vec<Seat>> {
+        let (first, rest) = path.segments.split_first()?;
+        let group = built.groups.get(&first.name.text)?;
+        let chosen = self.chosen(first, group.len())?;
+        let components: Vec<usize> = chosen.into_iter().map(|i| group[i]).collect();
+        let Some((feature, deeper)) = rest.split_first() else {
+            return Some(
+                components.into_iter().map(|component| Seat { component, frame: PoseExpr::identity() }).collect(),
+            );
+        };
+        if let Some(too_deep) = deeper.first() {
+            let message = format!("`{}` has no parts of its own", feature.name.text);
+            self.report(
+                Diagnostic::error("E0203", too_deep.name.span, message).label("a feature is the last of its path"),
+            );
+            return None;
+        }
+        let mut seats = Vec::new();
+        for component in components {
+            seats.extend(self.feature_seats(component, feature, built)?);
+        }
+        Some(seats)
+    }
+
+    fn feature_seats(&mut self, component: usize, wanted: &ast::Segment, built: &Assembled) -> Option<Vec<Seat>> {
+        let part = &built.parts[built.components[component].part];
+        let Some(feature) = part.features.iter().find(|f| f.name == wanted.name.text) else {
+            let message = format!("part `{}` has no feature `{}`", part.name, wanted.name.text);
+            let diagnostic = Diagnostic::error("E0201", wanted.name.span, message).label("unknown feature");
+            let names = part.features.iter().map(|f| f.name.as_str());
+            self.report(match nearest(&wanted.name.text, names.clone()) {
+                Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+                None => diagnostic.help(format!("its features: {}", names.collect::<Vec<_>>().join(", "))),
+            });
+            return None;
+        };
+        let chosen = self.chosen(wanted, feature.copies.len())?;
+        Some(chosen.into_iter().map(|i| Seat { component, frame: feature.copies[i].pose.clone() }).collect())
+    }
+
+    /// Indices that `[2]` or `[1..3]` picks among `count`; all without an index.
+    pub fn chosen(&mut self, segment: &ast::Segment, count: usize) -> Option<Vec<usize>> {
+        let Some(index) = &segment.index else { return Some((0..count).collect()) };
+        let last = index.last.unwrap_or(index.first);
+        if index.first >= 1 && index.first <= last && last <= count as u64 {
+            return Some((index.first as usize - 1..last as usize).collect());
+        }
+        let message = format!("`{}` has {}", segment.name.text, copies(count));
+        self.report(
+            Diagnostic::error("E0505", index.span, message)
+                .label("no such copy")
+                .help(format!("write `{}[1]`", segment.name.text)),
+        );
+        None
+    }
+
+    fn counts_differ(&mut self, place: &ast::Place, count: u64, seats: usize) {
+        let part = &place.part.as_ref().unwrap_or(&place.name).text;
+        let target = place.on.segments.iter().map(|s| s.name.text.as_str()).collect::<Vec<_>>().join(".");
+        let message = format!("{count}x `{part}` on `{target}`, which has {}", copies(seats));
+        let span = place.count.as_ref().map_or(place.name.span, |c| c.span);
+        let help = if count < seats as u64 && place.on.segments.iter().all(|s| s.index.is_none()) {
+            let chosen = if count == 1 { "1".to_string() } else { format!("1..{count}") };
+            format!("write `{seats}x {part}`, or place on `{target}[{chosen}]`")
+        } else {
+            format!("write `place {} = {seats}x {part} on {target}`", place.name.text)
+        };
+        self.report(
+            Diagnostic::error("E0505", span, message)
+                .label("counts differ")
+                .also(place.on.span, copies(seats))
+                .help(help),
+        );
+    }
+
+    fn unsupported(&mut self, waiting: &[&ast::Place], built: &Assembled) {
+        let names: Vec<&str> = waiting.iter().map(|p| p.name.text.as_str()).collect();
+        for place in waiting {
+            let support = &place.on.segments[0].name;
+            if names.contains(&support.text.as_str()) {
+                continue;
+            }
+            let message = format!("no component is named `{}`", support.text);
+            let diagnostic = Diagnostic::error("E0201", support.span, message).label("unknown component");
+            let known = built.groups.keys().map(String::as_str);
+            self.report(match nearest(&support.text, known.clone().chain(names.iter().copied())) {
+                Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+                None => diagnostic.help(format!("components so far: {}", known.collect::<Vec<_>>().join(", "))),
+            });
+        }
+        self.placement_cycle(waiting);
+    }
+
+    /// Follows supports from each waiting placement until one repeats; reports the first circle.
+    fn placement_cycle(&mut self, waiting: &[&ast::Place]) {
+        let by_name: BTreeMap<&str, &ast::Place> = waiting.iter().map(|p| (p.name.text.as_str(), *p)).collect();
+        for start in waiting {
+            let mut chain = vec![*start];
+            while let Some(next) = chain.last().and_then(|p| by_name.get(p.on.segments[0].name.text.as_str())) {
+                if std::ptr::eq(*next, *start) {
+                    return self.report_cycle(&chain);
+                }
+                if chain.len() > waiting.len() {
+                    break;
+                }
+                chain.push(*next);
+            }
+        }
+    }
+
+    fn report_cycle(&mut self, chain: &[&ast::Place]) {
+        let names: Vec<String> = chain.iter().chain(chain.first()).map(|p| format!("`{}`", p.name.text)).collect();
+        let message = format!("{}: nothing carries them", names.join(" on "));
+        let mut diagnostic = Diagnostic::error("E0504", chain[0].on.span, message).label("placed in a circle");
+        for place in &chain[1..] {
+            diagnostic = diagnostic.also(place.on.span, "and here");
+        }
+        self.report(diagnostic.help("place one of them on the root, or on what the root carries"));
+    }
+
+    fn pose(&mut self, place: &ast::Place, name: &str) -> (PoseExpr, [bool; 6]) {
+        let body = place.body.as_ref();
+        let owner = format!("place {}", place.name.text);
+        let fields = body.map_or_else(
+            || Fields::none(&owner, place.name.span),
+            |body| Fields::of_body(&owner, place.name.span, body),
+        );
+        self.check_fields(&fields, &AXES.map(|(axis, _)| axis));
+        let mut free = [false; 6];
+        let exprs: Vec<Expr> = AXES
+            .iter()
+            .enumerate()
+            .map(|(i, &(axis, quantity))| {
+                let path = format!("{name}.{axis}");
+                free[i] = is_free(fields.get(axis));
+                self.axis(fields.get(axis), quantity, &path).unwrap_or(Expr::Const(0.0))
+            })
+            .collect();
+        let [x, y, z, rx, ry, rz] = <[Expr; 6]>::try_from(exprs).unwrap_or_else(|_| [0; 6].map(|_| Expr::Const(0.0)));
+        (PoseExpr { t: [x, y, z], r: [rx, ry, rz] }, free)
+    }
+
+    fn axis(&mut self, value: Option<&Value>, quantity: Quantity, path: &str) -> Option<Expr> {
+        let value = value?;
+        let dim = self.dim_of(value)?;
+        if !is_free(Some(value)) {
+            return self.dimension(dim, quantity, General::Basic, path);
+        }
+        if quantity == Quantity::Angle {
+            let turn = Range { low: -PI, nominal: 0.0, high: PI };
+            return Some(self.new_dim(path.to_string(), quantity, turn, Remark::default(), dim.span));
+        }
+        let message = "only a turn can be `free`";
+        self.report(
+            Diagnostic::error("E0211", dim.span, message).label("a length needs limits").help("write `0 ±0.1`"),
+        );
+        None
+    }
+}
+
+fn component(name: String, part: usize, seat: Seat, (pose, free): (PoseExpr, [bool; 6]), span: Span) -> Component {
+    let parent = (seat.component != usize::MAX).then_some(seat.component);
+    Component { name, part, parent, frame: seat.frame, pose, free, span }
+}
+
+fn is_free(value: Option<&Value>) -> bool {
+    matches!(value, Some(Value::Dim(dim)) if dim.word() == Some("free"))
+}
+
+fn as_place(line: &ast::Line) -> Option<&ast::Place> {
+    match &line.stmt {
+        Stmt::Place(place) => Some(place),
+        _ => None,
+    }
+}
+
+fn as_root(line: &ast::Line) -> Option<(&ast::Name, Option<&ast::Name>)> {
+    match &line.stmt {
+        Stmt::Root { name, part } => Some((name, part.as_ref())),
+        _ => None,
+    }
+}
+
+/// How often each part is placed.
+fn pieces(body: &ast::Body) -> BTreeMap<&str, u64> {
+    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
+    for line in &body.lines {
+        let (part, count) = match &line.stmt {
+            Stmt::Place(p) => (p.part.as_ref().unwrap_or(&p.name), p.count.as_ref().map_or(1, |c| c.value)),
+            Stmt::Root { name, part } => (part.as_ref().unwrap_or(name), 1),
+            _ => continue,
+        };
+        let total = counts.entry(&part.text).or_default();
+        *total = total.saturating_add(count);
+    }
+    counts
+}
+
+fn copies(count: usize) -> String {
+    if count == 1 { "1 copy".to_string() } else { format!("{count} copies") }
+}

@@ -1,0 +1,233 @@
+//! `station`: camera, lights, floor, and what varies from photo to photo.
+//!
+//! Every field has a default; docs/language.md lists them.
+
+use super::fields::Fields;
+use super::model::{CameraPlacing, CameraSpec, Floor, LightShape, LightSpec, Response, Station};
+use super::scope::Resolver;
+use crate::diag::{Diagnostic, Span};
+use crate::syntax::ast::{Body, Call, Name, Stmt, Value};
+use crate::units::{Quantity, Range};
+use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// Images larger than this in either direction (px) are refused.
+const MAX_SIDE: u64 = 8192;
+const POSITIVE: [f64; 2] = [f64::MIN_POSITIVE, f64::MAX];
+const ANY: [f64; 2] = [f64::MIN, f64::MAX];
+
+/// Drift of a lamp whose spec does not say, ± this share.
+const DRIFT: f64 = 0.1;
+
+const CAMERA_FIELDS: [&str; 12] =
+    ["image", "focal", "pitch", "aim", "distance", "elevation", "azimuth", "k1", "offset", "tilt", "blur", "response"];
+
+impl Resolver {
+    pub fn station(&mut self, name: &Name, body: &Body, materials: &BTreeMap<&str, usize>) -> Station {
+        let nothing = Body::default();
+        let mut camera = None;
+        let mut lights: Vec<LightSpec> = Vec::new();
+        let mut floor = None;
+        let mut vary = Fields::none("vary", name.span);
+        for line in &body.lines {
+            match &line.stmt {
+                Stmt::Camera { mode, body } => camera = Some(self.camera(mode.as_ref(), body, line.span)),
+                Stmt::Light { name, call } => {
+                    if let Some(first) = lights.iter().find(|l| l.name == name.text) {
+                        let first = first.span;
+                        self.duplicate("light", name, first);
+                    }
+                    lights.extend(self.light(name, call));
+                }
+                Stmt::Floor(body) => floor = Some(self.floor(body, line.span, materials)),
+                Stmt::Vary(body) => vary = Fields::of_body("vary", line.span, body),
+                _ => {}
+            }
+        }
+        if !body.lines.iter().any(|line| matches!(line.stmt, Stmt::Light { .. })) {
+            self.dark(name);
+        }
+        self.check_fields(&vary, &["x", "y", "z", "rz", "exposure", "noise"]);
+        let still = Range::exactly(0.0);
+        Station {
+            name: name.text.clone(),
+            camera: camera.unwrap_or_else(|| self.camera(None, &nothing, name.span)),
+            lights,
+            floor,
+            x: self.range_or(&vary, "x", Quantity::Length, still),
+            y: self.range_or(&vary, "y", Quantity::Length, still),
+            z: self.range_or(&vary, "z", Quantity::Length, still),
+            rz: self.range_or(&vary, "rz", Quantity::Angle, still),
+            exposure: self.range_within(&vary, "exposure", Quantity::Ratio, Range::symmetric(1.0, 0.05), POSITIVE),
+            noise: self.exact_or(&vary, "noise", Quantity::Ratio, 0.005, [0.0, 1.0]),
+            span: name.span,
+        }
+    }
+
+    fn dark(&mut self, name: &Name) {
+        self.report(
+            Diagnostic::error("E0207", name.span, format!("station `{}` has no light", name.text))
+                .label("every photo would be black")
+                .help("the light of a room: `light room = room(patches = 9)`"),
+        );
+    }
+
+    fn camera(&mut self, mode: Option<&Name>, body: &Body, span: Span) -> CameraSpec {
+        let fields = Fields::of_body("camera", head(span), body);
+        self.check_fields(&fields, &CAMERA_FIELDS);
+        let responses = [("linear", Response::Linear), ("srgb", Response::Srgb)];
+        CameraSpec {
+            image: self.image(&fields),
+            focal: self.range_within(&fields, "focal", Quantity::Length, Range::symmetric(16.0, 0.08), POSITIVE),
+            pitch: self.exact_or(&fields, "pitch", Quantity::Length, 0.0074, POSITIVE),
+            aim: self.point_or(&fields, "aim", [0.0; 3]),
+            placing: self.placing(&fields, mode.is_some_and(|m| m.text == "auto")),
+            k1: self.range_within(&fields, "k1", Quantity::Ratio, Range::exactly(0.0), [-0.3, 0.3]),
+            install_mm: self.error_of(&fields, "offset", Quantity::Length, 1.0),
+            install_rad: self.error_of(&fields, "tilt", Quantity::Angle, 0.3f64.to_radians()),
+            blur: self.range_within(
+                &fields,
+                "blur",
+                Quantity::Pixels,
+                Range { low: 0.3, nominal: 0.5, high: 0.8 },
+                [0.0, 20.0],
+            ),
+            response: self.word_or(&fields, "response", &responses, Response::Linear),
+            span,
+        }
+    }
+
+    fn image(&mut self, fields: &Fields) -> [u32; 2] {
+        const USUAL: [u32; 2] = [640, 480];
+        let Some(value) = fields.get("image") else { return USUAL };
+        let Value::Extent { width, height, unit, span } = value else {
+            self.wrong_form(value.span(), "a size in pixels: `640 x 480 px`");
+            return USUAL;
+        };
+        if let Some(other) = unit.as_ref().filter(|u| u.text != "px") {
+            self.report(
+                Diagnostic::error("E0205", other.span, "an image is measured in pixels")
+                    .label("not pixels")
+                    .help(format!("write `{width} x {height} px`")),
+            );
+        }
+        let sides = [*width, *height];
+        if sides.iter().all(|side| (16..=MAX_SIDE).contains(side)) {
+            return sides.map(|side| side as u32);
+        }
+        let message = format!("an image has 16 to {MAX_SIDE} pixels each way");
+        self.report(Diagnostic::error("E0211", *span, message).label("out of range"));
+        USUAL
+    }
+
+    fn placing(&mut self, fields: &Fields, auto: bool) -> CameraPlacing {
+        const UPRIGHT: [f64; 2] = [0.0, FRAC_PI_2 + 1e-9];
+        let (near, far) = (250.0, 400.0);
+        if !auto {
+            return CameraPlacing::Fixed {
+                distance: self.exact_or(fields, "distance", Quantity::Length, 300.0, POSITIVE),
+                elevation: self.exact_or(fields, "elevation", Quantity::Angle, FRAC_PI_2, UPRIGHT),
+                azimuth: self.exact_or(fields, "azimuth", Quantity::Angle, -FRAC_PI_2, [-TAU, TAU]),
+            };
+        }
+        let spread = |low: f64, high: f64| Range { low, nominal: (low + high) / 2.0, high };
+        let steep = spread(40f64.to_radians(), FRAC_PI_2);
+        CameraPlacing::Auto {
+            distance: self.range_within(fields, "distance", Quantity::Length, spread(near, far), POSITIVE),
+            elevation: self.range_within(fields, "elevation", Quantity::Angle, steep, UPRIGHT),
+            azimuth: self.range_within(fields, "azimuth", Quantity::Angle, Range::exactly(-FRAC_PI_2), [-TAU, TAU]),
+        }
+    }
+
+    /// An installation error, written `0 ±1.5`: half its width.
+    fn error_of(&mut self, fields: &Fields, key: &str, want: Quantity, default: f64) -> f64 {
+        let range = self.range_or(fields, key, want, Range::symmetric(0.0, default));
+        if range.nominal == 0.0 && range.low == -range.high {
+            return range.high;
+        }
+        let span = fields.get(key).map_or(fields.span, Value::span);
+        let message = format!("`{key}` is an error about zero");
+        self.report(
+            Diagnostic::error("E0211", span, message)
+                .label("not symmetric about zero")
+                .help(format!("write `{key} = 0 ±{default:.1}`")),
+        );
+        default
+    }
+
+    fn light(&mut self, name: &Name, call: &Call) -> Option<LightSpec> {
+        let fields = Fields::of_args(&call.name, &call.args);
+        let shape = match call.name.text.as_str() {
+            "ring" => self.ring(&fields),
+            "panel" | "bar" => self.panel(&fields),
+            "room" => {
+                self.check_fields(&fields, &["patches", "power"]);
+                LightShape::Room { patches: self.whole_or(&fields, "patches", 9, [1, 64]) as u32 }
+            }
+            other => {
+                let message = format!("no light is named `{other}`");
+                let diagnostic = Diagnostic::error("E0201", call.name.span, message).label("unknown light");
+                self.report(diagnostic.help("write `ring`, `panel`, `bar` or `room`"));
+                return None;
+            }
+        };
+        let power = self.range_within(&fields, "power", Quantity::Ratio, Range::symmetric(1.0, DRIFT), [0.0, f64::MAX]);
+        let drift = if power.nominal > 0.0 { power.half_width() / power.nominal } else { 0.0 };
+        Some(LightSpec { name: name.text.clone(), shape, power: power.nominal, drift, span: name.span })
+    }
+
+    fn ring(&mut self, fields: &Fields) -> LightShape {
+        self.check_fields(fields, &["inner", "outer", "setback", "power"]);
+        let inner = self.exact_or(fields, "inner", Quantity::Length, 30.0, [0.0, f64::MAX]);
+        let outer = self.exact_or(fields, "outer", Quantity::Length, inner + 20.0, POSITIVE);
+        if outer <= inner {
+            let span = fields.get("outer").map_or(fields.span, Value::span);
+            let message = format!("the outer radius {outer} is not larger than the inner radius {inner}");
+            self.report(Diagnostic::error("E0211", span, message).label("an empty ring"));
+        }
+        LightShape::Ring { inner, outer, setback: self.exact_or(fields, "setback", Quantity::Length, 0.0, ANY) }
+    }
+
+    fn panel(&mut self, fields: &Fields) -> LightShape {
+        self.check_fields(fields, &["width", "height", "at", "aim", "power"]);
+        for (key, example) in [("width", "100"), ("height", "100"), ("at", "(0, -100, 300)")] {
+            if fields.get(key).is_none() {
+                self.missing(fields, key, example);
+            }
+        }
+        let (at, aim) = (self.point_or(fields, "at", [0.0, 0.0, 300.0]), self.point_or(fields, "aim", [0.0; 3]));
+        if at == aim {
+            let span = fields.get("at").map_or(fields.span, Value::span);
+            self.report(
+                Diagnostic::error("E0211", span, "the light is aimed at itself").label("`at` and `aim` are one point"),
+            );
+        }
+        LightShape::Panel {
+            width: self.exact_or(fields, "width", Quantity::Length, 100.0, POSITIVE),
+            height: self.exact_or(fields, "height", Quantity::Length, 100.0, POSITIVE),
+            at,
+            aim,
+        }
+    }
+
+    fn floor(&mut self, body: &Body, span: Span, materials: &BTreeMap<&str, usize>) -> Floor {
+        let fields = Fields::of_body("floor", head(span), body);
+        self.check_fields(&fields, &["z", "material"]);
+        let z = self.exact_or(&fields, "z", Quantity::Length, 0.0, ANY);
+        let material = match fields.get("material") {
+            Some(value) => self.material_named(value, materials),
+            None => {
+                let example = materials.keys().next().copied().unwrap_or("paint");
+                self.missing(&fields, "material", example);
+                0
+            }
+        };
+        Floor { z, material }
+    }
+}
+
+/// The first word of a block, for labels.
+fn head(span: Span) -> Span {
+    const KEYWORD: u32 = 5;
+    Span { end: span.end.min(span.start + KEYWORD), ..span }
+}

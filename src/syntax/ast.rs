@@ -1,0 +1,314 @@
+//! The syntax tree: what was written, in the order it was written, with spans and comments.
+//!
+//! Nothing is resolved here: a number keeps its digits and its unit, a name is only a name. Serialising a tree leaves its
+//! spans out, so two files that differ in layout alone serialise alike.
+
+use crate::diag::Span;
+use serde::Serialize;
+
+/// One source file.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct File {
+    pub lines: Vec<Line>,
+    /// Comments and blank lines after the last item.
+    pub end: Vec<Gap>,
+}
+
+/// A statement with the comments that belong to it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Line {
+    /// Comments and blank lines above.
+    pub before: Vec<Gap>,
+    pub stmt: Stmt,
+    /// Comment behind the statement, on its line.
+    pub after: Option<String>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// What stands between two statements.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub enum Gap {
+    Blank,
+    /// With its slashes.
+    Comment(String),
+}
+
+/// The lines between two braces.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Body {
+    /// Comment behind the opening brace.
+    pub open: Option<String>,
+    pub lines: Vec<Line>,
+    pub end: Vec<Gap>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub enum Stmt {
+    Version(u64),
+    /// Length and angle.
+    Units(Name, Name),
+    Tolerances(Name),
+    Use(Name),
+    Let {
+        name: Name,
+        dim: Dim,
+    },
+    Material {
+        name: Name,
+        body: Body,
+    },
+    Part {
+        name: Name,
+        body: Body,
+    },
+    Feature(Box<Feature>),
+    Assembly {
+        name: Name,
+        body: Body,
+    },
+    /// `root base = plate`; without `= plate` the part has the component's name.
+    Root {
+        name: Name,
+        part: Option<Name>,
+    },
+    Place(Box<Place>),
+    Station {
+        name: Name,
+        body: Body,
+    },
+    Camera {
+        mode: Option<Name>,
+        body: Body,
+    },
+    Light {
+        name: Name,
+        call: Call,
+    },
+    Floor(Body),
+    Vary(Body),
+    Inspect {
+        name: Option<Name>,
+        body: Body,
+    },
+    Watch {
+        path: Path,
+        args: Option<Args>,
+    },
+    Ignore(Path),
+    Train(Body),
+    Field {
+        key: Name,
+        value: Value,
+    },
+}
+
+/// A name, or any other single word, with its place.
+#[derive(Debug, Clone, Serialize)]
+pub struct Name {
+    pub text: String,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// `cut bore = 3x cylinder(…) at (…) turn (…) on circle(…)`
+#[derive(Debug, Clone, Serialize)]
+pub struct Feature {
+    /// `add`, `cut` or `keep`.
+    pub op: Name,
+    pub name: Name,
+    pub count: Option<Count>,
+    pub shape: Call,
+    pub at: Option<Point>,
+    pub turn: Option<Point>,
+    pub on: Option<Call>,
+}
+
+/// `place pin = 3x pin on plate.bore { … }`
+#[derive(Debug, Clone, Serialize)]
+pub struct Place {
+    pub name: Name,
+    pub count: Option<Count>,
+    pub part: Option<Name>,
+    pub on: Path,
+    pub body: Option<Body>,
+}
+
+/// `3x`
+#[derive(Debug, Clone, Serialize)]
+pub struct Count {
+    /// The largest number if the digits say more than it holds.
+    pub value: u64,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// `cylinder(d = 6 H7, h = through)`
+#[derive(Debug, Clone, Serialize)]
+pub struct Call {
+    pub name: Name,
+    pub args: Args,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Args {
+    pub list: Vec<Arg>,
+    /// Comments after the last argument.
+    pub end: Vec<String>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Arg {
+    /// Comments above.
+    pub before: Vec<String>,
+    pub key: Name,
+    pub value: Value,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub enum Value {
+    Text(Name),
+    Point(Point),
+    /// `640 x 480 px`
+    Extent {
+        width: u64,
+        height: u64,
+        unit: Option<Name>,
+        #[serde(skip)]
+        span: Span,
+    },
+    Dim(Dim),
+}
+
+impl Value {
+    pub fn span(&self) -> Span {
+        match self {
+            Value::Text(name) => name.span,
+            Value::Point(point) => point.span,
+            Value::Extent { span, .. } => *span,
+            Value::Dim(dim) => dim.span,
+        }
+    }
+}
+
+/// Two or three coordinates.
+#[derive(Debug, Clone, Serialize)]
+pub struct Point {
+    pub dims: Vec<Dim>,
+    pub unit: Option<Name>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// A number of the drawing.
+#[derive(Debug, Clone, Serialize)]
+pub struct Dim {
+    pub size: Size,
+    pub tolerance: Option<Tolerance>,
+    pub each: bool,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub enum Size {
+    Quantity(Quantity),
+    Sum(Sum),
+    Path(Path),
+    /// `{ mmc 19.8, nominal 20.0, lmc 20.3 }`
+    States {
+        states: Vec<(Name, Quantity)>,
+        unit: Option<Name>,
+    },
+}
+
+/// A number as written, with its unit.
+#[derive(Debug, Clone, Serialize)]
+pub struct Quantity {
+    pub number: Number,
+    pub unit: Option<Name>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Number {
+    pub text: String,
+    /// Infinite when the digits say more than an `f64` holds.
+    #[serde(skip)]
+    pub value: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub enum Tolerance {
+    /// `±0.2`, `±20 %`
+    PlusMinus(Quantity),
+    /// `+0/-0.1`: upper deviation first.
+    Deviations {
+        upper: Number,
+        lower: Number,
+        unit: Option<Name>,
+    },
+    /// `8.00 .. 8.05`
+    Limits(Quantity),
+    /// `H7`
+    Fit(Name),
+    Basic,
+}
+
+/// Arithmetic inside parentheses.
+#[derive(Debug, Clone, Serialize)]
+pub enum Sum {
+    Quantity(Quantity),
+    Path(Path),
+    Negative(Box<Sum>),
+    /// Operator: one of `+ - * /`.
+    Binary(char, Box<Sum>, Box<Sum>),
+    /// Parentheses as written.
+    Group(Box<Sum>),
+}
+
+/// `plate.bore[2]`
+#[derive(Debug, Clone, Serialize)]
+pub struct Path {
+    pub segments: Vec<Segment>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Segment {
+    pub name: Name,
+    pub index: Option<Index>,
+}
+
+/// `[2]` or `[1..3]`, counted from 1.
+#[derive(Debug, Clone, Serialize)]
+pub struct Index {
+    pub first: u64,
+    pub last: Option<u64>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+impl Path {
+    /// The single word this path consists of, if it is one.
+    pub fn word(&self) -> Option<&str> {
+        match self.segments.as_slice() {
+            [Segment { name, index: None }] => Some(&name.text),
+            _ => None,
+        }
+    }
+}
+
+impl Dim {
+    /// The bare word (`free`, `through`, `srgb`) this value consists of, if it is one.
+    pub fn word(&self) -> Option<&str> {
+        match (&self.size, &self.tolerance) {
+            (Size::Path(path), None) if !self.each => path.word(),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! What to say about a text that does not parse.
+//!
+//! In: where the parser gave up and what it would have taken. Out: a diagnostic in the words of the drawing office. The
+//! usual slips (a sum without parentheses, deviations without a slash, a pair of fits, a misspelt keyword) are recognised
+//! from the text around that place.
+
+use super::scan::strip_comment;
+use crate::diag::suggest::nearest;
+use crate::diag::{Diagnostic, Span};
+
+/// Where parsing stopped (byte offset) and what would have been accepted there, in words.
+pub struct Fault {
+    pub at: usize,
+    pub expected: Vec<&'static str>,
+}
+
+/// The diagnostic for a fault in `text`, which begins at `offset` of file `file`.
+pub fn describe(text: &str, fault: &Fault, file: u32, offset: usize) -> Diagnostic {
+    let span = |at: usize, len: usize| Span { file, start: (offset + at) as u32, end: (offset + at + len) as u32 };
+    if let Some(slip) = dimension_slip(text, fault.at) {
+        return Diagnostic::error(slip.code, span(slip.at, slip.len), slip.message).label(slip.label).help(slip.help);
+    }
+    let found = token_at(text, fault.at);
+    let message = format!("expected {}, found {}", list(&fault.expected), spoken(found));
+    let diagnostic =
+        Diagnostic::error("E0101", span(fault.at, found.trim_end().len()), message).label("not expected here");
+    match keyword_meant(found, &fault.expected) {
+        Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
+        None => diagnostic,
+    }
+}
+
+struct Slip {
+    code: &'static str,
+    at: usize,
+    len: usize,
+    message: String,
+    label: &'static str,
+    help: String,
+}
+
+/// Recognises the usual slips in the dimension around `at`.
+fn dimension_slip(text: &str, at: usize) -> Option<Slip> {
+    let (start, dim) = dimension_around(text, at)?;
+    let words: Vec<&str> = dim.split_whitespace().collect();
+    let slip = |code, message: &str, label, help| {
+        Some(Slip { code, at: start, len: dim.len(), message: message.to_string(), label, help })
+    };
+    match words.as_slice() {
+        [size, pair] if is_fit_pair(pair) => {
+            let (hole, shaft) = pair.split_once('/')?;
+            let help = format!("write `{size} {hole}` in the part with the hole and `{size} {shaft}` in the other");
+            slip("E0309", &format!("`{pair}` names the fits of two parts"), "one size has one fit", help)
+        }
+        [size, tolerance] if tolerance.starts_with('±') && tolerance.contains('/') => {
+            let (upper, lower) = tolerance.trim_start_matches('±').split_once('/')?;
+            let help = format!("write `{size} +{upper}/-{lower}`");
+            slip("E0104", "`±` takes one deviation", "two deviations", help)
+        }
+        [size, upper, lower] if is_signed(upper) && is_signed(lower) => {
+            let help = format!("write `{size} {upper}/{lower}`");
+            slip("E0104", "a two-sided tolerance needs a slash", "two deviations without a slash", help)
+        }
+        [size, deviation] if is_signed(deviation) => {
+            let sum = format!("({size} {} {})", &deviation[..1], &deviation[1..]);
+            let both = if deviation.starts_with('+') { format!("{deviation}/0") } else { format!("0/{deviation}") };
+            let help = format!("write `{size} {both}` for a tolerance, or `{sum}` for a sum");
+            slip("E0104", "a deviation stands alone", "one deviation", help)
+        }
+        _ if is_bare_sum(dim) => {
+            slip("E0103", "sums need parentheses", "arithmetic outside parentheses", format!("write `({dim})`"))
+        }
+        _ => None,
+    }
+}
+
+/// The text between the `=`, `(` or `,` before `at` and the `,`, `)` or line end behind it, with its offset.
+fn dimension_around(text: &str, at: usize) -> Option<(usize, &str)> {
+    let line_start = text[..at].rfind('\n').map_or(0, |i| i + 1);
+    let line_end = text[at..].find('\n').map_or(text.len(), |i| at + i);
+    let line_end = line_start + strip_comment(&text[line_start..line_end]).len();
+    let start = line_start + text[line_start..at.min(line_end)].rfind(['=', '(', ','])? + 1;
+    let end = text[at.min(line_end)..line_end].find([',', ')']).map_or(line_end, |i| at + i);
+    let dim = &text[start..end];
+    let indent = dim.len() - dim.trim_start().len();
+    Some((start + indent, dim.trim()))
+}
+
+fn is_signed(word: &str) -> bool {
+    word.len() > 1 && word.starts_with(['+', '-']) && word[1..].parse::<f64>().is_ok()
+}
+
+fn is_fit_pair(word: &str) -> bool {
+    let class = |s: &str| {
+        let digits = s.trim_start_matches(|c: char| c.is_ascii_alphabetic());
+        !digits.is_empty() && digits.len() < s.len() && digits.bytes().all(|b| b.is_ascii_digit())
+    };
+    word.split_once('/').is_some_and(|(hole, shaft)| class(hole) && class(shaft))
+}
+
+/// Operands joined by operators, and nothing else.
+fn is_bare_sum(dim: &str) -> bool {
+    let operator = |c: char| matches!(c, '+' | '-' | '*' | '/');
+    let operand = |s: &str| {
+        let s = s.trim();
+        !s.is_empty() && s.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.' | ' '))
+    };
+    dim.contains(operator) && dim.split(operator).all(operand)
+}
+
+/// The word, number or sign at `at`, or nothing at the end of the line.
+fn token_at(text: &str, at: usize) -> &str {
+    let rest = &text[at..];
+    let word = |c: char| c.is_alphanumeric() || c == '_';
+    match rest.chars().next() {
+        None | Some('\n' | '\r') => "",
+        Some(c) if word(c) => &rest[..rest.find(|c| !word(c)).unwrap_or(rest.len())],
+        Some(c) => &rest[..c.len_utf8()],
+    }
+}
+
+fn spoken(token: &str) -> String {
+    if token.is_empty() { "the end of the line".to_string() } else { format!("`{token}`") }
+}
+
+/// `a`, `b` or `c`.
+fn list(expected: &[&str]) -> String {
+    match expected {
+        [] => "the end of the line".to_string(),
+        [one] => (*one).to_string(),
+        [most @ .., last] => format!("{} or {last}", most.join(", ")),
+    }
+}
+
+/// The keyword that `found` was meant to be: misspelt, or grown together with the name behind it.
+fn keyword_meant(found: &str, expected: &[&str]) -> Option<String> {
+    let keywords: Vec<&str> = expected.iter().filter_map(|w| w.strip_prefix('`')?.strip_suffix('`')).collect();
+    let glued = keywords.iter().find(|k| found.len() > k.len() && found.starts_with(**k));
+    match glued {
+        Some(keyword) => Some(format!("{keyword} {}", found[keyword.len()..].trim_start_matches('_'))),
+        None => nearest(found, keywords.iter().copied()).map(str::to_string),
+    }
+}

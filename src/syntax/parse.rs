@@ -1,0 +1,465 @@
+//! Text to tree. The only file that knows the parser generator.
+//!
+//! Each item is parsed by itself. When one does not parse, the fault is reported, the statement that holds it is blanked
+//! out, and the item is tried again, so that one run reports several faults of one block.
+
+use super::ast::*;
+use super::faults::{self, Fault};
+use super::scan::{scan, strip_comment};
+use crate::diag::{Diagnostic, Span};
+use pest::Parser;
+use pest::iterators::Pair;
+use std::borrow::Cow;
+
+/// A spec longer than this is a mistake (bytes).
+const MAX_TEXT: usize = 1 << 20;
+/// Faults reported per item, and per file.
+const MAX_FAULTS_PER_ITEM: usize = 8;
+const MAX_FAULTS: usize = 40;
+
+#[derive(pest_derive::Parser)]
+#[grammar = "grammar/gonogo.pest"]
+struct Grammar;
+
+/// The tree of `text`, without what could not be read, and why that could not be read. `file` is the text's index in
+/// [`crate::diag::Sources`].
+pub fn parse(text: &str, file: u32) -> (File, Vec<Diagnostic>) {
+    if text.len() > MAX_TEXT {
+        let message = format!("this file has {} bytes, the limit is {MAX_TEXT}", text.len());
+        return (File::default(), vec![Diagnostic::error("E0101", Span { file, start: 0, end: 0 }, message)]);
+    }
+    let (chunks, mut diagnostics) = scan(text, file);
+    let mut tree = File::default();
+    for chunk in chunks.iter().filter(|chunk| !chunk.broken) {
+        let builder = Builder { file, offset: chunk.start };
+        tree.lines.extend(parse_chunk(&text[chunk.start..chunk.end], &builder, &mut diagnostics));
+    }
+    tree.end = parse_tail(&text[chunks.last().map_or(0, |chunk| chunk.end)..]);
+    diagnostics.sort_by_key(|d| d.labels[0].span.start);
+    diagnostics.truncate(MAX_FAULTS);
+    (tree, diagnostics)
+}
+
+fn parse_chunk(text: &str, builder: &Builder, diagnostics: &mut Vec<Diagnostic>) -> Option<Line> {
+    let mut text = Cow::Borrowed(text.strip_prefix('\u{feff}').unwrap_or(text));
+    for _ in 0..MAX_FAULTS_PER_ITEM {
+        let error = match Grammar::parse(Rule::chunk, &text) {
+            Ok(mut pairs) => return builder.lines(pairs.next()?).0.pop(),
+            Err(error) => error,
+        };
+        let fault = fault(&error);
+        diagnostics.push(faults::describe(&text, &fault, builder.file, builder.offset));
+        text = Cow::Owned(without_statement(&text, fault.at)?);
+    }
+    None
+}
+
+/// The comments and blank lines behind the last item.
+fn parse_tail(text: &str) -> Vec<Gap> {
+    let comment = |line: &str| match line.trim() {
+        "" => Gap::Blank,
+        words => Gap::Comment(words.to_string()),
+    };
+    // The first line is the rest of the line of the last item.
+    text.lines().skip(usize::from(text.starts_with(['\n', '\r']))).map(comment).collect()
+}
+
+fn fault(error: &pest::error::Error<Rule>) -> Fault {
+    let at = match error.location {
+        pest::error::InputLocation::Pos(at) | pest::error::InputLocation::Span((at, _)) => at,
+    };
+    let mut expected: Vec<&'static str> = match &error.variant {
+        pest::error::ErrorVariant::ParsingError { positives, .. } => {
+            positives.iter().flat_map(|r| words(*r)).copied().collect()
+        }
+        pest::error::ErrorVariant::CustomError { .. } => Vec::new(),
+    };
+    let mut seen = std::collections::BTreeSet::new();
+    expected.retain(|word| seen.insert(*word));
+    Fault { at, expected }
+}
+
+/// The text with the statement at `at` replaced by spaces; `None` if that would tear a block open.
+fn without_statement(text: &str, at: usize) -> Option<String> {
+    let (start, end) = statement_at(text, at);
+    let statement = &text[start..end];
+    let code: String = statement.lines().map(strip_comment).collect();
+    if code.trim().is_empty() || code.matches('{').count() != code.matches('}').count() || code.contains('"') {
+        return None;
+    }
+    let blank: String = statement.bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }).collect();
+    Some(format!("{}{blank}{}", &text[..start], &text[end..]))
+}
+
+/// Start and end of the lines of the statement at `at`: lines joined by open parentheses are one statement.
+fn statement_at(text: &str, at: usize) -> (usize, usize) {
+    let (mut start, mut end, mut depth) = (0, 0, 0i32);
+    for line in text.split_inclusive('\n') {
+        if depth <= 0 {
+            (start, depth) = (end, 0);
+        }
+        end += line.len();
+        let code = strip_comment(line);
+        depth += code.matches('(').count() as i32 - code.matches(')').count() as i32;
+        if at < end && depth <= 0 {
+            break;
+        }
+    }
+    (start, end)
+}
+
+/// What a rule is called in a message; nothing for what goes without saying.
+fn words(rule: Rule) -> &'static [&'static str] {
+    match rule {
+        Rule::version => &["`gonogo 1`"],
+        Rule::units => &["`units`"],
+        Rule::general => &["`tolerances`"],
+        Rule::use_file => &["`use`"],
+        Rule::let_dim => &["`let`"],
+        Rule::material => &["`material`"],
+        Rule::part => &["`part`"],
+        Rule::assembly => &["`assembly`"],
+        Rule::station => &["`station`"],
+        Rule::inspect => &["`inspect`"],
+        Rule::train => &["`train`"],
+        Rule::feature | Rule::op => &["`add`", "`cut`", "`keep`"],
+        Rule::root => &["`root`"],
+        Rule::place => &["`place`"],
+        Rule::camera => &["`camera`"],
+        Rule::light => &["`light`"],
+        Rule::floor => &["`floor`"],
+        Rule::vary => &["`vary`"],
+        Rule::watch => &["`watch`"],
+        Rule::ignore => &["`ignore`"],
+        Rule::on | Rule::kw_on => &["`on`"],
+        Rule::at | Rule::kw_at => &["`at`"],
+        Rule::turn | Rule::kw_turn => &["`turn`"],
+        Rule::mode => &["`fixed`", "`auto`"],
+        Rule::each => &["`each`"],
+        Rule::field | Rule::arg => &["`name = value`"],
+        Rule::key | Rule::name | Rule::path | Rule::segment => &["a name"],
+        Rule::word | Rule::call => &["a word"],
+        Rule::class => &["`ISO2768-m`", "`exact`"],
+        Rule::value | Rule::dim => &["a value"],
+        Rule::number | Rule::quantity | Rule::integer => &["a number"],
+        Rule::string => &["a file name in quotes"],
+        Rule::point => &["a point `(x, y, z)`"],
+        Rule::args => &["arguments in parentheses"],
+        Rule::count => &["a count such as `3x`"],
+        Rule::unit => &["a unit"],
+        Rule::plus_minus | Rule::deviations | Rule::limits | Rule::fit | Rule::basic => &["a tolerance"],
+        Rule::plus | Rule::times => &["an operator"],
+        Rule::state_name | Rule::state => &["`mmc`", "`nominal`", "`lmc`"],
+        Rule::index => &["`[`"],
+        Rule::field_body | Rule::part_body | Rule::assembly_body | Rule::station_body | Rule::inspect_body => &["`{`"],
+        _ => &[],
+    }
+}
+
+/// Makes tree nodes from the pairs of one item, with spans in the whole file.
+struct Builder {
+    file: u32,
+    offset: usize,
+}
+
+type Node<'i> = Pair<'i, Rule>;
+
+impl Builder {
+    fn span(&self, pair: &Node) -> Span {
+        let span = pair.as_span();
+        let [start, end] = [span.start(), span.end()].map(|at| (at + self.offset) as u32);
+        Span { file: self.file, start, end }
+    }
+
+    /// The statements inside a pair, and what stands behind the last.
+    fn lines(&self, pair: Node) -> (Vec<Line>, Vec<Gap>) {
+        let (mut lines, mut gaps): (Vec<Line>, Vec<Gap>) = (Vec::new(), Vec::new());
+        for inner in pair.into_inner() {
+            match inner.as_rule() {
+                Rule::EOI => {}
+                Rule::blank_line => gaps.push(Gap::Blank),
+                Rule::comment_line => gaps.push(Gap::Comment(inner.as_str().trim().to_string())),
+                Rule::note => {
+                    if let Some(line) = lines.last_mut() {
+                        line.after = Some(inner.as_str().trim_end().to_string());
+                    }
+                }
+                _ => {
+                    let span = self.span(&inner);
+                    let before = std::mem::take(&mut gaps);
+                    lines.push(Line { before, stmt: self.stmt(inner), after: None, span });
+                }
+            }
+        }
+        (lines, gaps)
+    }
+
+    fn body(&self, pair: Node) -> Body {
+        let first = pair.clone().into_inner().next().filter(|p| p.as_rule() == Rule::note);
+        let (lines, end) = self.lines(pair);
+        Body { open: first.map(|p| p.as_str().trim_end().to_string()), lines, end }
+    }
+
+    fn stmt(&self, pair: Node) -> Stmt {
+        let rule = pair.as_rule();
+        let mut inner = Children::of(pair.clone());
+        match rule {
+            Rule::version => Stmt::Version(inner.text(Rule::integer).parse().unwrap_or(u64::MAX)),
+            Rule::units => {
+                let words: Vec<Name> = inner.all(Rule::word).iter().map(|p| self.name(p)).collect();
+                Stmt::Units(words[0].clone(), words[1].clone())
+            }
+            Rule::general => Stmt::Tolerances(self.name(&inner.take(Rule::class))),
+            Rule::use_file => Stmt::Use(self.string(&inner.take(Rule::string))),
+            Rule::let_dim => {
+                Stmt::Let { name: self.name(&inner.take(Rule::name)), dim: self.dim(inner.take(Rule::dim)) }
+            }
+            Rule::material => {
+                Stmt::Material { name: self.name(&inner.take(Rule::name)), body: self.body(inner.last()) }
+            }
+            Rule::part => Stmt::Part { name: self.name(&inner.take(Rule::name)), body: self.body(inner.last()) },
+            Rule::assembly => {
+                Stmt::Assembly { name: self.name(&inner.take(Rule::name)), body: self.body(inner.last()) }
+            }
+            Rule::station => Stmt::Station { name: self.name(&inner.take(Rule::name)), body: self.body(inner.last()) },
+            Rule::inspect => {
+                Stmt::Inspect { name: inner.find(Rule::name).map(|p| self.name(&p)), body: self.body(inner.last()) }
+            }
+            Rule::camera => {
+                Stmt::Camera { mode: inner.find(Rule::mode).map(|p| self.name(&p)), body: self.body(inner.last()) }
+            }
+            Rule::floor => Stmt::Floor(self.body(inner.last())),
+            Rule::vary => Stmt::Vary(self.body(inner.last())),
+            Rule::train => Stmt::Train(self.body(inner.last())),
+            Rule::light => Stmt::Light { name: self.name(&inner.take(Rule::name)), call: self.call(inner.last()) },
+            Rule::feature => Stmt::Feature(Box::new(self.feature(inner))),
+            Rule::root => {
+                let names: Vec<Name> = inner.all(Rule::name).iter().map(|p| self.name(p)).collect();
+                Stmt::Root { name: names[0].clone(), part: names.get(1).cloned() }
+            }
+            Rule::place => Stmt::Place(Box::new(self.place(inner))),
+            Rule::watch => Stmt::Watch {
+                path: self.path(inner.take(Rule::path)),
+                args: inner.find(Rule::args).map(|p| self.args(p)),
+            },
+            Rule::ignore => Stmt::Ignore(self.path(inner.take(Rule::path))),
+            _ => Stmt::Field { key: self.name(&inner.take(Rule::key)), value: self.value(inner.last()) },
+        }
+    }
+
+    fn feature(&self, inner: Children) -> Feature {
+        let point = |rule| inner.find(rule).map(|p| self.point(Children::of(p).take(Rule::point)));
+        Feature {
+            op: self.name(&inner.take(Rule::op)),
+            name: self.name(&inner.take(Rule::name)),
+            count: inner.find(Rule::count).map(|p| self.count(&p)),
+            shape: self.call(inner.take(Rule::call)),
+            at: point(Rule::at),
+            turn: point(Rule::turn),
+            on: inner.find(Rule::on).map(|p| self.call(Children::of(p).take(Rule::call))),
+        }
+    }
+
+    fn place(&self, inner: Children) -> Place {
+        let names: Vec<Name> = inner.all(Rule::name).iter().map(|p| self.name(p)).collect();
+        Place {
+            name: names[0].clone(),
+            count: inner.find(Rule::count).map(|p| self.count(&p)),
+            part: names.get(1).cloned(),
+            on: self.path(inner.take(Rule::path)),
+            body: inner.find(Rule::field_body).map(|p| self.body(p)),
+        }
+    }
+
+    fn name(&self, pair: &Node) -> Name {
+        Name { text: pair.as_str().to_string(), span: self.span(pair) }
+    }
+
+    /// A string without its quotes.
+    fn string(&self, pair: &Node) -> Name {
+        Name { text: pair.as_str().trim_matches('"').to_string(), span: self.span(pair) }
+    }
+
+    fn count(&self, pair: &Node) -> Count {
+        Count { value: pair.as_str().trim_end_matches('x').parse().unwrap_or(u64::MAX), span: self.span(pair) }
+    }
+
+    fn call(&self, pair: Node) -> Call {
+        let inner = Children::of(pair);
+        Call { name: self.name(&inner.take(Rule::word)), args: self.args(inner.take(Rule::args)) }
+    }
+
+    fn args(&self, pair: Node) -> Args {
+        let span = self.span(&pair);
+        let (mut list, mut notes) = (Vec::new(), Vec::new());
+        for inner in pair.into_inner() {
+            if inner.as_rule() == Rule::note {
+                notes.push(inner.as_str().trim_end().to_string());
+                continue;
+            }
+            let inner = Children::of(inner);
+            let (key, value) = (self.name(&inner.take(Rule::key)), self.value(inner.last()));
+            list.push(Arg { before: std::mem::take(&mut notes), key, value });
+        }
+        Args { list, end: notes, span }
+    }
+
+    fn value(&self, pair: Node) -> Value {
+        let pair = Children::of(pair).last();
+        match pair.as_rule() {
+            Rule::string => Value::Text(self.string(&pair)),
+            Rule::point => Value::Point(self.point(pair)),
+            Rule::extent => {
+                let span = self.span(&pair);
+                let inner = Children::of(pair);
+                let sides: Vec<u64> =
+                    inner.all(Rule::integer).iter().map(|p| p.as_str().parse().unwrap_or(u64::MAX)).collect();
+                Value::Extent { width: sides[0], height: sides[1], unit: self.unit(&inner), span }
+            }
+            _ => Value::Dim(self.dim(pair)),
+        }
+    }
+
+    fn point(&self, pair: Node) -> Point {
+        let span = self.span(&pair);
+        let inner = Children::of(pair);
+        Point { dims: inner.all(Rule::dim).into_iter().map(|p| self.dim(p)).collect(), unit: self.unit(&inner), span }
+    }
+
+    fn dim(&self, pair: Node) -> Dim {
+        let span = self.span(&pair);
+        let inner = Children::of(pair);
+        let size = match inner.first() {
+            p if p.as_rule() == Rule::states => self.states(p),
+            p if p.as_rule() == Rule::quantity => Size::Quantity(self.quantity(p)),
+            p if p.as_rule() == Rule::sum_group => Size::Sum(self.sum(Children::of(p).last())),
+            p => Size::Path(self.path(p)),
+        };
+        let tolerance = inner.0.iter().skip(1).find_map(|p| self.tolerance(p));
+        Dim { size, tolerance, each: inner.find(Rule::each).is_some(), span }
+    }
+
+    fn states(&self, pair: Node) -> Size {
+        let inner = Children::of(pair);
+        let state = |p: Node| {
+            let inner = Children::of(p);
+            (self.name(&inner.take(Rule::state_name)), self.quantity(inner.take(Rule::quantity)))
+        };
+        Size::States { states: inner.all(Rule::state).into_iter().map(state).collect(), unit: self.unit(&inner) }
+    }
+
+    fn tolerance(&self, pair: &Node) -> Option<Tolerance> {
+        let inner = Children::of(pair.clone());
+        Some(match pair.as_rule() {
+            Rule::plus_minus => Tolerance::PlusMinus(self.quantity(inner.last())),
+            Rule::limits => Tolerance::Limits(self.quantity(inner.last())),
+            Rule::fit => Tolerance::Fit(self.name(pair)),
+            Rule::basic => Tolerance::Basic,
+            Rule::deviations => {
+                let [upper, lower] = [0, 1].map(|i| number(&inner.all(Rule::number)[i]));
+                Tolerance::Deviations { upper, lower, unit: self.unit(&inner) }
+            }
+            _ => return None,
+        })
+    }
+
+    fn quantity(&self, pair: Node) -> Quantity {
+        let span = self.span(&pair);
+        let inner = Children::of(pair);
+        Quantity { number: number(&inner.take(Rule::number)), unit: self.unit(&inner), span }
+    }
+
+    fn unit(&self, inner: &Children) -> Option<Name> {
+        let pair = inner.find(Rule::unit)?;
+        let text = match pair.as_str() {
+            "°" => "deg",
+            "µm" | "μm" => "um",
+            text => text,
+        };
+        Some(Name { text: text.to_string(), span: self.span(&pair) })
+    }
+
+    /// Left to right, as precedence has already been settled by the grammar.
+    fn sum(&self, pair: Node) -> Sum {
+        let mut inner = pair.into_inner();
+        let mut left = inner.next().map_or_else(nothing, |p| self.operand(p));
+        while let (Some(operator), Some(right)) = (inner.next(), inner.next()) {
+            let sign = operator.as_str().chars().next().unwrap_or('+');
+            left = Sum::Binary(sign, Box::new(left), Box::new(self.operand(right)));
+        }
+        left
+    }
+
+    fn operand(&self, pair: Node) -> Sum {
+        match pair.as_rule() {
+            Rule::product => self.sum(pair),
+            Rule::factor => {
+                let inner = Children::of(pair);
+                let value = self.operand(inner.last());
+                if inner.find(Rule::minus).is_some() { Sum::Negative(Box::new(value)) } else { value }
+            }
+            Rule::sum_group => Sum::Group(Box::new(self.sum(Children::of(pair).last()))),
+            Rule::quantity => Sum::Quantity(self.quantity(pair)),
+            _ => Sum::Path(self.path(pair)),
+        }
+    }
+
+    fn path(&self, pair: Node) -> Path {
+        let span = self.span(&pair);
+        let segment = |p: Node| {
+            let inner = Children::of(p);
+            let index = inner.find(Rule::index).map(|p| {
+                let span = self.span(&p);
+                let mut ends =
+                    Children::of(p).all(Rule::integer).into_iter().map(|p| p.as_str().parse().unwrap_or(u64::MAX));
+                Index { first: ends.next().unwrap_or(0), last: ends.next(), span }
+            });
+            Segment { name: self.name(&inner.take(Rule::name)), index }
+        };
+        Path { segments: Children::of(pair).all(Rule::segment).into_iter().map(segment).collect(), span }
+    }
+}
+
+fn number(pair: &Node) -> Number {
+    let text = pair.as_str().replace('−', "-");
+    // A syntactically valid number parses; one too large becomes infinite and is reported where it is used.
+    let value = text.parse().unwrap_or(f64::NAN);
+    Number { text, value }
+}
+
+fn nothing() -> Sum {
+    Sum::Path(Path { segments: Vec::new(), span: Span::default() })
+}
+
+/// The pairs inside a pair, found by rule. The grammar guarantees those that are taken.
+struct Children<'i>(Vec<Node<'i>>);
+
+impl<'i> Children<'i> {
+    fn of(pair: Node<'i>) -> Self {
+        Children(pair.into_inner().collect())
+    }
+
+    fn all(&self, rule: Rule) -> Vec<Node<'i>> {
+        self.0.iter().filter(|p| p.as_rule() == rule).cloned().collect()
+    }
+
+    fn find(&self, rule: Rule) -> Option<Node<'i>> {
+        self.0.iter().find(|p| p.as_rule() == rule).cloned()
+    }
+
+    fn take(&self, rule: Rule) -> Node<'i> {
+        self.find(rule).unwrap_or_else(|| unreachable!("the grammar has {rule:?} here"))
+    }
+
+    fn first(&self) -> Node<'i> {
+        self.0.first().cloned().unwrap_or_else(|| unreachable!("the grammar has a child here"))
+    }
+
+    fn last(&self) -> Node<'i> {
+        self.0.last().cloned().unwrap_or_else(|| unreachable!("the grammar has a child here"))
+    }
+
+    fn text(&mut self, rule: Rule) -> &'i str {
+        self.take(rule).as_str()
+    }
+}

@@ -1,0 +1,111 @@
+//! The specifications users start from: each must load without a word of complaint and lie in canonical layout.
+
+use gonogo::design::model::{Design, Expr, LightShape, Sense};
+use gonogo::design::{Loaded, load};
+
+fn read(path: &str) -> std::io::Result<String> {
+    std::fs::read_to_string(path)
+}
+
+fn loaded(path: &str) -> Loaded {
+    load(path, &read, &[])
+}
+
+fn design(name: &str) -> Design {
+    let loaded = loaded(&format!("specs/{name}.gng"));
+    assert!(loaded.diagnostics.is_empty(), "{:#?}", loaded.diagnostics);
+    loaded.design.unwrap()
+}
+
+fn dim<'a>(design: &'a Design, name: &str) -> &'a gonogo::design::model::Dimension {
+    design.dims.iter().find(|d| d.name == name).unwrap_or_else(|| panic!("no {name}"))
+}
+
+#[test]
+fn every_spec_is_in_canonical_layout() {
+    for name in ["pattern_wheel"] {
+        let text = read(&format!("specs/{name}.gng")).unwrap();
+        assert_eq!(gonogo::syntax::format(&text).unwrap(), text, "{name}");
+    }
+}
+
+#[test]
+fn pattern_wheel_has_the_components_of_the_paper() {
+    let design = design("pattern_wheel");
+    let names: Vec<&str> = design.components.iter().map(|c| c.name.as_str()).collect();
+    let expected = [
+        "gear",
+        "shaft",
+        "locking_ring",
+        "alignment_pin[1]",
+        "alignment_pin[2]",
+        "alignment_pin[3]",
+        "wheel_a1",
+        "wheel_a2",
+        "hd_pin",
+        "unlatch_pin",
+    ];
+    assert_eq!(names, expected);
+    assert_eq!(design.inspect.watch.len(), expected.len() - 1);
+    let stations: Vec<&str> = design.stations.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(stations, ["A", "B", "C"]);
+    assert!(matches!(design.stations[0].lights[0].shape, LightShape::Ring { inner: 45.0, outer: 75.0, setback: 20.0 }));
+    assert!((design.stations[0].lights[0].drift - 0.15).abs() < 1e-12);
+}
+
+#[test]
+fn pattern_wheel_stands_where_its_table_says() {
+    let design = design("pattern_wheel");
+    let poses = gonogo::assembly::place::place(&design, &design.nominal());
+    let polar = |r: f64, degrees: f64| [r * degrees.to_radians().cos(), r * degrees.to_radians().sin()];
+    let expected = [
+        (1, [0.0, 0.0], -4.0),
+        (2, [0.0, 0.0], 6.0),
+        (3, polar(18.0, 90.0), 0.5),
+        (4, polar(18.0, 210.0), 0.5),
+        (5, polar(18.0, 330.0), 0.5),
+        (6, [0.0, 0.0], 12.0),
+        (7, [0.0, 0.0], 18.0),
+        (8, polar(23.5, 30.0), 11.0),
+        (9, polar(23.5, 150.0), 11.0),
+    ];
+    for (i, [x, y], z) in expected {
+        let t = poses[i].translation.vector;
+        assert!((t.x - x).abs() + (t.y - y).abs() + (t.z - z).abs() < 1e-9, "{} {t:?}", design.components[i].name);
+    }
+}
+
+#[test]
+fn every_pin_is_a_piece_of_its_own() {
+    let design = design("pattern_wheel");
+    for pin in 1..=3 {
+        let foot = dim(&design, &format!("alignment_pin[{pin}].foot_step.d"));
+        assert_eq!(foot.sense, Sense::External);
+        assert!((foot.mmc - 3.996).abs() < 1e-12 && (foot.lmc - 3.988).abs() < 1e-12);
+        dim(&design, &format!("alignment_pin[{pin}].z"));
+    }
+    let parts: Vec<usize> = (3..=5).map(|i| design.components[i].part).collect();
+    assert!(parts[0] != parts[1] && parts[1] != parts[2]);
+}
+
+#[test]
+fn holes_are_drawn_one_by_one_and_tooth_gaps_together() {
+    let design = design("pattern_wheel");
+    for hole in 1..=3 {
+        let d = dim(&design, &format!("gear.pin_hole[{hole}].d"));
+        assert_eq!((d.sense, d.mmc, d.lmc), (Sense::Internal, 4.0, 4.012));
+    }
+    assert_eq!(design.dims.iter().filter(|d| d.name.starts_with("gear.gap")).count(), 1);
+}
+
+#[test]
+fn the_steps_of_a_pin_share_their_lengths() {
+    let design = design("pattern_wheel");
+    let pin = &design.parts[design.components[3].part];
+    let mut values = design.nominal();
+    let foot = design.dims.iter().position(|d| d.name == "alignment_pin[1].foot").unwrap();
+    values[foot] += 0.01;
+    let collar = pin.features[1].copies[0].pose.eval(&values).translation.z;
+    assert!((collar - 8.51).abs() < 1e-12);
+    assert!(!matches!(pin.features[1].copies[0].pose.t[2], Expr::Const(_)));
+}
