@@ -1,4 +1,11 @@
 //! gonogo compiles a text file that describes a mechanical assembly into an inspector for it.
+//!
+//! The name is the go/no-go gauge: its GO side checks maximum material, its NO-GO side least material. [`compile`] runs the
+//! line from a spec to a [`Model`](runtime::model::Model); [`runtime`] judges photos with the model and knows nothing of the
+//! compiler. The modules stand below in running order, each using only those beneath it in the house: `cli` on the roof,
+//! then this page, the stages from last to first, and `runtime`, `diag`, `units` and `rng` as the ground.
+//!
+//! Every stage is a pure function: no I/O, no clock, no globals, no printing. What is wrong with a spec is data.
 
 #[cfg(feature = "compile")]
 pub mod diag;
@@ -9,6 +16,7 @@ pub mod rng;
 #[cfg(feature = "compile")]
 pub mod units;
 
+// The stages, in running order.
 #[cfg(feature = "compile")]
 pub mod assembly;
 #[cfg(feature = "compile")]
@@ -22,11 +30,75 @@ pub mod solid;
 #[cfg(feature = "compile")]
 pub mod syntax;
 #[cfg(feature = "compile")]
+pub mod train;
+#[cfg(feature = "compile")]
 pub mod variation;
 #[cfg(feature = "compile")]
 pub mod view;
 
-#[cfg(feature = "compile")]
-pub mod train;
-
+// What the machine on the line needs.
 pub mod runtime;
+
+#[cfg(feature = "compile")]
+pub mod artifacts;
+#[cfg(feature = "compile")]
+pub mod golden;
+#[cfg(feature = "compile")]
+mod line;
+
+#[cfg(feature = "cli")]
+pub mod cli;
+
+#[cfg(feature = "compile")]
+pub use line::{Compiled, Observer, Options, Progress, Stage};
+
+#[cfg(feature = "compile")]
+use artifacts::Artifact;
+
+/// Compiles a spec, as far as `options` asks for.
+///
+/// `read` gives the text of a file by its name: the spec itself, and what it uses. Faults of the spec are in
+/// [`Compiled::diagnostics`], and what could be made in spite of them in the rest. The same spec and the same options give
+/// the same bytes at any number of threads.
+#[cfg(feature = "compile")]
+pub fn compile(spec: &str, read: design::Read, options: &Options, observer: &Observer) -> Compiled {
+    let mut line = line::Line::new(options, observer);
+    // A stage that cannot go on has said why in the diagnostics.
+    let _ = run(spec, read, &mut line);
+    line.out
+}
+
+/// The line, stage by stage; `None` where it ends early, by fault or because no more was asked for.
+#[cfg(feature = "compile")]
+fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
+    line.enter(Stage::Design)?;
+    let design = line.loaded(design::load(spec, read, &line.options.set))?;
+    let station = line.accept(line::station(&design, line.options.station.as_deref()))?;
+    line.emit(Artifact::Design, || artifacts::design(&design));
+
+    line.enter(Stage::Solid)?;
+    let shapes = line.accept(line::shapes(&design))?;
+    let solids = line::per_component(&design, &shapes);
+    line.emit(Artifact::Brep, || artifacts::brep(&design, &shapes));
+
+    line.enter(Stage::Assembly)?;
+    let analysis = line.check(assembly::analyse(&design, &solids))?;
+    let trees = assembly::error_tree::object_tree(&design, &analysis.liaison).trees;
+    let modes = assembly::fault::modes(&design, &analysis.liaison, &analysis.insertion, &solids);
+    line.emit_assembly(&design, &solids, &analysis, &trees);
+
+    line.enter(Stage::View)?;
+    let bodies = line::bodies(&design, station, &solids);
+    let choice = view::choose::choose(&design, station, &bodies, &view::choose::targets(&trees));
+    let camera = line.check((choice.camera, choice.diagnostics.clone()))?;
+    line.emit(Artifact::View, || artifacts::view(&design, station, &choice));
+    line.emit_images(|| artifacts::images::pictures(&design, station, &camera, &modes));
+
+    line.enter(Stage::Plan)?;
+    let (spec, datum) = (line::digest(&design), line::datum(&design, &modes));
+    let job = train::Job { design: &design, station, camera, modes: &modes, datum: &datum, spec };
+    let trained = train::train(&job, &|step, done, total| line.tell(step.into(), done, total));
+    let (model, doubts) = line.accept(trained)?;
+    line.out.model = Some(model);
+    line.check(((), doubts))
+}

@@ -1,0 +1,78 @@
+//! The command line: the only place that prints, reads arguments, and knows terminals, files and clocks.
+//!
+//! In: arguments. Out: files, text and an exit code. Judges and computes nothing itself.
+
+mod args;
+mod compile;
+mod demo;
+mod font;
+mod format;
+mod golden;
+mod judge;
+mod messages;
+mod output;
+mod overlay;
+mod progress;
+pub mod report;
+mod verdict;
+
+use args::{Cli, Command, Explain, Golden, MessageFormat};
+use clap::{ColorChoice, CommandFactory, FromArgMatches};
+use output::Failure;
+use std::process::ExitCode;
+
+/// What the exit code says. `inspect`: all go, a no-go, something could not be judged; others: fine, diagnostics, usage or
+/// the outside world. Ordered: the worst of several is their maximum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Exit {
+    Fine = 0,
+    Faults = 1,
+    Trouble = 2,
+}
+
+/// Runs the program.
+pub fn main() -> ExitCode {
+    let exit = match parse() {
+        Ok(cli) => run(&cli).unwrap_or_else(|Failure(why)| {
+            output::remark(&judge::coded(&why));
+            Exit::Trouble
+        }),
+        Err(usage) => {
+            // Help and version are no errors; clap knows where each belongs.
+            let _ = usage.print();
+            if usage.use_stderr() { Exit::Trouble } else { Exit::Fine }
+        }
+    };
+    ExitCode::from(exit as u8)
+}
+
+fn parse() -> Result<Cli, clap::Error> {
+    // The colour of help and usage errors has to be known before parsing.
+    let asked = std::env::args().collect::<Vec<_>>().windows(2).any(|w| w[0] == "--color" && w[1] == "never");
+    let colour = if asked { ColorChoice::Never } else { ColorChoice::Auto };
+    Cli::from_arg_matches(&Cli::command().color(colour).try_get_matches()?)
+}
+
+fn run(cli: &Cli) -> Result<Exit, Failure> {
+    let global = &cli.global;
+    if global.message_format == MessageFormat::Sarif {
+        return Err(Failure("`--message-format sarif` is not available yet".into()));
+    }
+    match &cli.command {
+        Command::Compile(args) => compile::compile(args, global),
+        Command::Check(args) => compile::check(args, global),
+        Command::Fmt(args) => format::format(args, global),
+        Command::Calibrate(args) => judge::calibrate(args),
+        Command::Inspect(args) => judge::inspect(args),
+        Command::Explain(args) => explain(args),
+        Command::Golden(Golden::Check(args)) => golden::check(args, global),
+        Command::Golden(Golden::Bless(args)) => golden::bless(args, global),
+        Command::Demo(args) => demo::demo(args, global),
+    }
+}
+
+/// Prints the page of a diagnostic.
+fn explain(args: &Explain) -> Result<Exit, Failure> {
+    let code = args.code.to_ascii_uppercase();
+    Err(Failure(format!("there is no page for `{code}` yet")))
+}

@@ -16,4 +16,4 @@ mod sense;
 mod station;
 mod task;
 
-pub use load::{Loaded, load};
+pub use load::{Loaded, Read, load};

@@ -62,21 +62,14 @@ pub fn find(ground: &Ground, surface: &Surface, count: usize) -> Vec<EdgePoint> 
 fn field(ground: &Ground, shot: &Shot, index: usize) -> Field {
     let mut stream = Stream::new(ground.seed, "locator light", index as u64);
     // From a fifth to twice the described power: a description is a prior only.
-    let weights: Vec<f64> =
-        ground.powers.iter().map(|p| p * stream.between(0.2f64.ln(), 2f64.ln()).exp()).collect();
+    let weights: Vec<f64> = ground.powers.iter().map(|p| p * stream.between(0.2f64.ln(), 2f64.ln()).exp()).collect();
     let light = shot.lit(&weights).reduced((ground.factor / ground.base) as usize);
     Field::new(&light, NOISE, false)
 }
 
 /// Mean over the shots of the unit gradient at the image of `point`, brought back to the nominal image: a gradient is a
 /// covector, so it transforms with the transposed Jacobian.
-fn mean_orientation(
-    fields: &[(Field, &Pose)],
-    camera: &Camera,
-    home: &Pose,
-    point: Vec3,
-    at: [f64; 2],
-) -> [f32; 2] {
+fn mean_orientation(fields: &[(Field, &Pose)], camera: &Camera, home: &Pose, point: Vec3, at: [f64; 2]) -> [f32; 2] {
     let Some(steps) = steps_in_space(camera, home, point, at) else { return [0.0; 2] };
     let mut sum = [0.0f32; 2];
     for (field, pose) in fields {
@@ -151,9 +144,8 @@ fn edge_point(camera: &Camera, home: &Pose, point: Vec3, at: [f64; 2], gradient:
     let length = f64::from((gradient[0] * gradient[0] + gradient[1] * gradient[1]).sqrt());
     let direction = [f64::from(gradient[1]) / length, -f64::from(gradient[0]) / length];
     let steps = steps_in_space(camera, home, point, at)?;
-    let along: Vec3 = std::array::from_fn(|i| {
-        (steps[0][i] - point[i]) * direction[0] + (steps[1][i] - point[i]) * direction[1]
-    });
+    let along: Vec3 =
+        std::array::from_fn(|i| (steps[0][i] - point[i]) * direction[0] + (steps[1][i] - point[i]) * direction[1]);
     let unit = normalise(along);
     // The point lies on the pixel corner's own ray, not on the surface sample beside it.
     let plane = camera.on_plane(at, home.apply(point)[2]).map(|p| home.invert(p))?;
@@ -162,8 +154,7 @@ fn edge_point(camera: &Camera, home: &Pose, point: Vec3, at: [f64; 2], gradient:
 
 /// The grey value below which a share of the pixels lies.
 pub fn quantile(grid: &Grid, mask: impl Fn(usize) -> bool, share: f64) -> f32 {
-    let mut values: Vec<f32> =
-        grid.values.iter().enumerate().filter(|(i, _)| mask(*i)).map(|(_, &v)| v).collect();
+    let mut values: Vec<f32> = grid.values.iter().enumerate().filter(|(i, _)| mask(*i)).map(|(_, &v)| v).collect();
     if values.is_empty() {
         return 0.0;
     }

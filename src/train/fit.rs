@@ -64,7 +64,8 @@ pub fn node(context: &Context, plan: &NodePlan) -> Option<Node> {
 
 /// The good state and every mode, long sweeps in pieces.
 fn samples<'a>(context: &'a Context, plan: &NodePlan) -> Vec<Sample<'a>> {
-    let sample = |fault, sweep, shots: Vec<&'a Shot>| Sample { fault, sweep, shifts: vec![[0.0; 2]; shots.len()], shots };
+    let sample =
+        |fault, sweep, shots: Vec<&'a Shot>| Sample { fault, sweep, shifts: vec![[0.0; 2]; shots.len()], shots };
     let mut out = vec![sample("good", String::new(), context.shots.good.iter().collect())];
     for &m in &plan.modes {
         let mode = &context.modes[m];
@@ -90,8 +91,7 @@ fn sweep(motion: &Motion, low: f64, high: f64) -> String {
 fn pieces<'a>(context: &'a Context, mode: usize) -> Vec<(f64, f64, Vec<&'a Shot>)> {
     let Some(scene) = context.plan.scenes.iter().position(|s| s.contains(&mode)) else { return Vec::new() };
     let place = context.plan.scenes[scene].iter().position(|&m| m == mode).unwrap_or(0);
-    let mut all: Vec<(f64, &Shot)> =
-        context.shots.faulty[scene].iter().map(|f| (f.places[place], &f.shot)).collect();
+    let mut all: Vec<(f64, &Shot)> = context.shots.faulty[scene].iter().map(|f| (f.places[place], &f.shot)).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let swept = context.modes[mode].kind == FaultKind::NotSeated;
     let count = if swept { (all.len() / DRAWS_PER_HYPOTHESIS).max(1) } else { 1 };
@@ -195,10 +195,8 @@ pub fn locator(context: &Context, datum: &[bool]) -> Locator {
     let plan = context.plan;
     let good: Vec<&Shot> = context.shots.good.iter().collect();
     let on_datum = |x: usize, y: usize| datum[component_near(context, x, y)?].then_some(());
-    let mut groups = vec![PointGroup {
-        name: "datum".into(),
-        alternatives: vec![points(context, &good, "good", &on_datum, 1.0)],
-    }];
+    let mut groups =
+        vec![PointGroup { name: "datum".into(), alternatives: vec![points(context, &good, "good", &on_datum, 1.0)] }];
     if groups[0].alternatives[0].fine.len() < ENOUGH_DATUM_POINTS {
         groups.extend(plan.nodes.iter().map(|node| component_group(context, node)));
     }
@@ -274,4 +272,3 @@ fn surface_point(context: &Context, x: usize, y: usize) -> Option<Vec3> {
     let point = good.point([index % good.width, index / good.width], &camera)?;
     Some(context.home.invert(point))
 }
-

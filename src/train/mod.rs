@@ -81,7 +81,8 @@ fn doubts(job: &Job, plan: &Plan) -> Vec<Diagnostic> {
     let blind = |&m: &usize| {
         let mode = &job.modes[m];
         let component = &job.design.components[mode.component];
-        let message = format!("station `{}` cannot tell when `{}` is {}", job.station.name, component.name, mode.kind.word());
+        let message =
+            format!("station `{}` cannot tell when `{}` is {}", job.station.name, component.name, mode.kind.word());
         Diagnostic::warning("W0602", component.span, message)
             .label("nothing in the image changes")
             .note("a go says nothing about this fault; another view may show it")

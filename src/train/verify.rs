@@ -41,7 +41,8 @@ pub fn customer(model: &Model, index: u64) -> Customer {
     let focal = within(install.focal_share);
     let k1 = within((install.k1[1] - install.k1[0]) / 2.0);
     let exposure = stream.between(EXPOSURES[0], EXPOSURES[1]) / 0.6;
-    let powers = model.station.lamps.iter().map(|l| l.power * exposure * stream.between(LAMP_POWERS[0], LAMP_POWERS[1]));
+    let powers =
+        model.station.lamps.iter().map(|l| l.power * exposure * stream.between(LAMP_POWERS[0], LAMP_POWERS[1]));
     let powers = powers.collect();
     let installation = Installation { offset, turn, focal, k1 };
     Customer { installation, powers, noise: model.station.noise.max(0.002), seed: stream.bits() }

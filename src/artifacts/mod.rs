@@ -1,0 +1,428 @@
+//! What every stage made, as text that people review: for `--emit` and for goldens.
+//!
+//! In: the outputs of the stages. Out: RON in the user's names, lengths in mm, angles in degrees, numbers rounded to what
+//! matters. Summaries, not dumps: a golden of more than 20 KiB is a golden nobody reads. Never changes what it is shown.
+
+pub mod images;
+
+use crate::assembly::Analysis;
+use crate::assembly::contact::{Contact, FaceRef};
+use crate::assembly::error_tree::{self, ErrorTree};
+use crate::assembly::{insertion, liaison};
+use crate::design::model::{Design, Feature, LightShape, Part, Station};
+use crate::line::Stage;
+use crate::runtime::camera::Camera;
+use crate::runtime::model::{Hypothesis, Model, Node};
+use crate::solid::{Solid, Surface};
+use crate::units::{Quantity, Range};
+use crate::view::choose::Choice;
+use crate::view::item_buffer::PixelBox;
+use serde::Serialize;
+use serde::ser::{SerializeMap, Serializer};
+use std::sync::Arc;
+
+/// What can be asked for with `--emit`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Artifact {
+    Design,
+    Brep,
+    Step,
+    Contacts,
+    Liaison,
+    ErrorTrees,
+    ObjectTree,
+    Insertion,
+    View,
+    Images,
+    Model,
+}
+
+impl Artifact {
+    pub const ALL: [Artifact; 11] = [
+        Artifact::Design,
+        Artifact::Brep,
+        Artifact::Step,
+        Artifact::Contacts,
+        Artifact::Liaison,
+        Artifact::ErrorTrees,
+        Artifact::ObjectTree,
+        Artifact::Insertion,
+        Artifact::View,
+        Artifact::Images,
+        Artifact::Model,
+    ];
+
+    /// The word on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Artifact::Design => "design",
+            Artifact::Brep => "brep",
+            Artifact::Step => "step",
+            Artifact::Contacts => "contacts",
+            Artifact::Liaison => "liaison",
+            Artifact::ErrorTrees => "error-trees",
+            Artifact::ObjectTree => "object-tree",
+            Artifact::Insertion => "insertion",
+            Artifact::View => "view",
+            Artifact::Images => "images",
+            Artifact::Model => "model",
+        }
+    }
+
+    pub fn named(name: &str) -> Option<Artifact> {
+        Artifact::ALL.into_iter().find(|a| a.name() == name)
+    }
+
+    /// The stage that makes it.
+    pub fn stage(self) -> Stage {
+        match self {
+            Artifact::Design => Stage::Design,
+            Artifact::Brep | Artifact::Step => Stage::Solid,
+            Artifact::Contacts
+            | Artifact::Liaison
+            | Artifact::ErrorTrees
+            | Artifact::ObjectTree
+            | Artifact::Insertion => Stage::Assembly,
+            Artifact::View | Artifact::Images => Stage::View,
+            Artifact::Model => Stage::Verify,
+        }
+    }
+
+    /// `error_trees.ron`
+    pub fn file(self) -> String {
+        format!("{}.ron", self.name().replace('-', "_"))
+    }
+}
+
+/// A list that reads as a map, in its own order.
+struct Named<T>(Vec<(String, T)>);
+
+impl<T: Serialize> Serialize for Named<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        self.0.iter().try_for_each(|(k, v)| map.serialize_entry(k, v))?;
+        map.end()
+    }
+}
+
+/// Pretty RON down to `depth` levels; what lies deeper stands on one line.
+fn ron(depth: usize, value: &impl Serialize) -> String {
+    let config = ron::ser::PrettyConfig::new().depth_limit(depth).new_line("\n").indentor("  ");
+    let mut text = ron::ser::to_string_pretty(value, config).expect("plain data always serialises");
+    text.push('\n');
+    text
+}
+
+/// Rounded to `decimals`; never a negative zero, which would read as a change.
+fn rounded(value: f64, decimals: i32) -> f64 {
+    let scale = 10f64.powi(decimals);
+    (value * scale).round() / scale + 0.0
+}
+
+// --- Design ----------------------------------------------------------------------------------------------------------
+
+#[derive(Serialize)]
+struct DesignSummary<'a> {
+    name: &'a str,
+    /// Low, nominal, high, MMC, LMC.
+    dimensions: Named<[f64; 5]>,
+    parts: Named<PartSummary<'a>>,
+    /// Part, parent and nominal place in the parent's frame: x, y, z, rx, ry, rz.
+    components: Named<(&'a str, Option<&'a str>, [f64; 6])>,
+    stations: Named<StationSummary<'a>>,
+    watch: Vec<(&'a str, Option<u32>)>,
+    false_reject: f64,
+    train: &'a crate::design::model::Train,
+}
+
+#[derive(Serialize)]
+struct PartSummary<'a> {
+    material: &'a str,
+    /// Operation, shape, number of copies.
+    features: Named<(crate::design::model::Op, &'static str, usize)>,
+}
+
+#[derive(Serialize)]
+struct StationSummary<'a> {
+    image: [u32; 2],
+    lights: Named<&'static str>,
+    floor: Option<&'a str>,
+    standing: [[f64; 2]; 4],
+}
+
+/// The resolved design: every limit in mm or degrees, every name.
+pub fn design(design: &Design) -> String {
+    let summary = DesignSummary {
+        name: &design.name,
+        dimensions: Named(design.dims.iter().map(|d| (d.name.clone(), limits(d))).collect()),
+        parts: Named(design.parts.iter().map(|p| (p.name.clone(), part(design, p))).collect()),
+        components: Named(design.components.iter().map(|c| component(design, c)).collect()),
+        stations: Named(design.stations.iter().map(|s| (s.name.clone(), station(design, s))).collect()),
+        watch: design.inspect.watch.iter().map(|w| (design.components[w.component].name.as_str(), w.depth)).collect(),
+        false_reject: design.inspect.false_reject,
+        train: &design.train,
+    };
+    format!("// dimensions: (low, nominal, high, MMC, LMC) in mm and degrees\n{}", ron(2, &summary))
+}
+
+fn limits(dim: &crate::design::model::Dimension) -> [f64; 5] {
+    let unit = |v: f64| if dim.quantity == Quantity::Angle { v.to_degrees() } else { v };
+    let Range { low, nominal, high } = dim.range;
+    [low, nominal, high, dim.mmc, dim.lmc].map(|v| rounded(unit(v), 5))
+}
+
+fn part<'a>(design: &'a Design, part: &'a Part) -> PartSummary<'a> {
+    let feature = |f: &Feature| (f.name.clone(), (f.op, shape(f), f.copies.len()));
+    PartSummary {
+        material: &design.materials[part.material].name,
+        features: Named(part.features.iter().map(feature).collect()),
+    }
+}
+
+fn shape(feature: &Feature) -> &'static str {
+    use crate::design::model::Shape;
+    match feature.copies.first().map(|c| &c.shape) {
+        Some(Shape::Box { .. }) => "box",
+        Some(Shape::Cylinder { .. }) => "cylinder",
+        Some(Shape::Cone { .. }) => "cone",
+        Some(Shape::Sphere { .. }) => "sphere",
+        None => "nothing",
+    }
+}
+
+type ComponentSummary<'a> = (&'a str, Option<&'a str>, [f64; 6]);
+
+fn component<'a>(design: &'a Design, component: &'a crate::design::model::Component) -> (String, ComponentSummary<'a>) {
+    let values = design.nominal();
+    let pose = component.frame.eval(&values) * component.pose.eval(&values);
+    let (rx, ry, rz) = pose.rotation.euler_angles();
+    let [x, y, z] = pose.translation.vector.into();
+    let place = [x, y, z, rx.to_degrees(), ry.to_degrees(), rz.to_degrees()].map(|v| rounded(v, 5));
+    let parent = component.parent.map(|p| design.components[p].name.as_str());
+    (component.name.clone(), (design.parts[component.part].name.as_str(), parent, place))
+}
+
+fn station<'a>(design: &'a Design, station: &'a Station) -> StationSummary<'a> {
+    let light = |shape: &LightShape| match shape {
+        LightShape::Ring { .. } => "ring",
+        LightShape::Panel { .. } => "panel",
+        LightShape::Room { .. } => "room",
+    };
+    let range = |r: &Range, scale: f64| [r.low, r.high].map(|v| rounded(v * scale, 5));
+    let degrees = 1f64.to_degrees();
+    StationSummary {
+        image: station.camera.image,
+        lights: Named(station.lights.iter().map(|l| (l.name.clone(), light(&l.shape))).collect()),
+        floor: station.floor.as_ref().map(|f| design.materials[f.material].name.as_str()),
+        standing: [range(&station.x, 1.0), range(&station.y, 1.0), range(&station.z, 1.0), range(&station.rz, degrees)],
+    }
+}
+
+// --- Solids ----------------------------------------------------------------------------------------------------------
+
+/// A part at one limit.
+#[derive(Serialize)]
+struct SolidSummary {
+    planes: usize,
+    cylinders: usize,
+    cones: usize,
+    spheres: usize,
+    edges: usize,
+    vertices: usize,
+    /// mm² and mm³.
+    area: f64,
+    volume: f64,
+}
+
+/// Per part its solid at nominal, MMC and LMC, in that order.
+pub fn brep(design: &Design, limits: &[[Arc<Solid>; 3]]) -> String {
+    let of_part = |solids: &[Arc<Solid>; 3]| {
+        let names = ["nominal", "mmc", "lmc"].map(String::from);
+        Named(names.into_iter().zip(solids.iter().map(|s| solid(s))).collect())
+    };
+    let parts = design.parts.iter().zip(limits).map(|(part, solids)| (part.name.clone(), of_part(solids)));
+    ron(2, &Named(parts.collect()))
+}
+
+fn solid(solid: &Solid) -> SolidSummary {
+    let count = |is: fn(&Surface) -> bool| solid.faces.iter().filter(|f| is(&solid.surfaces[f.surface])).count();
+    SolidSummary {
+        planes: count(|s| matches!(s, Surface::Plane { .. })),
+        cylinders: count(|s| matches!(s, Surface::Cylinder { .. })),
+        cones: count(|s| matches!(s, Surface::Cone { .. })),
+        spheres: count(|s| matches!(s, Surface::Sphere { .. })),
+        edges: solid.edges.len(),
+        vertices: solid.vertices.len(),
+        area: rounded(solid.area, 3),
+        volume: rounded(solid.volume, 3),
+    }
+}
+
+// --- The assembly ----------------------------------------------------------------------------------------------------
+
+/// Every pair of faces that touch: their names, the kind of contact, the common area (mm²), the gap at nominal, MMC and
+/// LMC (mm) and the fit.
+pub fn contacts(design: &Design, solids: &[Arc<Solid>], analysis: &Analysis) -> String {
+    let line = |c: &Contact| {
+        let faces = [c.a, c.b].map(|f| face(design, solids, f));
+        let gap = [c.gap, c.gap_range[0], c.gap_range[1]].map(|g| rounded(g, 4));
+        (faces, c.kind, rounded(c.area, 2), gap, c.fit)
+    };
+    let list: Vec<_> = analysis.liaison.contacts.iter().map(line).collect();
+    format!("// faces, kind, area in mm², gap in mm (nominal, MMC, LMC), fit\n{}", ron(1, &list))
+}
+
+/// `gear.bore.side`
+fn face(design: &Design, solids: &[Arc<Solid>], face: FaceRef) -> String {
+    format!("{}.{}", design.components[face.component].name, solids[face.component].faces[face.face].name)
+}
+
+pub fn liaison(design: &Design, solids: &[Arc<Solid>], analysis: &Analysis) -> String {
+    ron(4, &liaison::summary(design, solids, &analysis.liaison))
+}
+
+pub fn error_trees(design: &Design, trees: &[ErrorTree]) -> String {
+    const DEPTH: usize = 64;
+    let summaries: Vec<_> = trees.iter().map(|tree| error_tree::summary(design, tree)).collect();
+    ron(DEPTH, &summaries)
+}
+
+/// The object tree: under the assembly, per watched component, who is reached at which level.
+pub fn object_tree(design: &Design, trees: &[ErrorTree]) -> String {
+    let name = |component: usize| design.components[component].name.as_str();
+    let levels = |tree: &ErrorTree| -> Vec<Vec<&str>> {
+        let deepest = tree.nodes.iter().map(|n| n.level).max().unwrap_or(0);
+        let at = |level| tree.nodes.iter().filter(|n| n.level == level).map(|n| name(n.component)).collect();
+        (0..=deepest).map(at).collect()
+    };
+    let trees = trees.iter().map(|t| (name(t.nodes[0].component).to_string(), levels(t))).collect();
+    ron(2, &Named(vec![(design.name.clone(), Named(trees))]))
+}
+
+pub fn insertion(design: &Design, analysis: &Analysis) -> String {
+    ron(2, &insertion::summary(design, &analysis.insertion))
+}
+
+// --- The view --------------------------------------------------------------------------------------------------------
+
+#[derive(Serialize)]
+struct ViewSummary<'a> {
+    station: &'a str,
+    position: [f64; 3],
+    forward: [f64; 3],
+    /// px
+    focal: f64,
+    size: [u32; 2],
+    views_tried: usize,
+    score: f64,
+    lamps: Vec<String>,
+    seen: Named<SeenSummary>,
+}
+
+/// What the camera sees of a component: boxes of the whole and of the visible part, px in all and visible, and the
+/// visible px of each face.
+#[derive(Serialize)]
+struct SeenSummary {
+    full: Option<[u32; 4]>,
+    visible: Option<[u32; 4]>,
+    pixels: [u32; 2],
+    faces: usize,
+}
+
+/// Camera, lamps, and what is seen of every component.
+pub fn view(design: &Design, station: &Station, choice: &Choice) -> String {
+    let Camera { position, axes, focal, size, .. } = choice.camera;
+    let corners = |b: &PixelBox| [b.x0, b.y0, b.x1, b.y1];
+    let seen = choice.seen.iter().map(|s| {
+        let summary = SeenSummary {
+            full: s.full.as_ref().map(corners),
+            visible: s.visible.as_ref().map(corners),
+            pixels: [s.full_pixels, s.visible_pixels],
+            faces: s.faces.len(),
+        };
+        (design.components[s.component].name.clone(), summary)
+    });
+    let summary = ViewSummary {
+        station: &station.name,
+        position: position.map(|v| rounded(v, 3)),
+        forward: axes[2].map(|v| rounded(v, 5)),
+        focal: rounded(focal, 3),
+        size,
+        views_tried: choice.table.len(),
+        score: rounded(choice.table[choice.best].score, 2),
+        lamps: crate::scene::build::lamps(station, &choice.camera).into_iter().map(|l| l.name).collect(),
+        seen: Named(seen.collect()),
+    };
+    ron(2, &summary)
+}
+
+// --- The model -------------------------------------------------------------------------------------------------------
+
+#[derive(Serialize)]
+struct ModelSummary<'a> {
+    writer: &'a str,
+    assembly: &'a str,
+    spec: &'a str,
+    digest: String,
+    seed: u64,
+    station: &'a crate::runtime::model::Station,
+    promise: &'a crate::runtime::model::Promise,
+    /// Groups of the locator: alternatives, fine points.
+    locator: Named<(usize, usize)>,
+    nodes: Named<NodeSummary<'a>>,
+}
+
+#[derive(Serialize)]
+struct NodeSummary<'a> {
+    level: u32,
+    plane: f64,
+    factor: u32,
+    origin: [i32; 2],
+    size: [u32; 2],
+    mask_pixels: u32,
+    threshold: f64,
+    /// Fault, sweep, images, mean and standard deviation of the integers.
+    hypotheses: Vec<(&'a str, &'a str, usize, f64, f64)>,
+}
+
+/// The model with every image reduced to its mean and spread.
+pub fn model_summary(model: &Model) -> String {
+    let groups = model.locator.groups.iter().map(|g| {
+        let points = g.alternatives.iter().map(|a| a.fine.len()).sum();
+        (g.name.clone(), (g.alternatives.len(), points))
+    });
+    let summary = ModelSummary {
+        writer: &model.writer,
+        assembly: &model.assembly,
+        spec: &model.spec,
+        digest: model.digest(),
+        seed: model.seed,
+        station: &model.station,
+        promise: &model.promise,
+        locator: Named(groups.collect()),
+        nodes: Named(model.nodes.iter().map(|n| (n.name.clone(), node(n))).collect()),
+    };
+    ron(4, &summary)
+}
+
+fn node(node: &Node) -> NodeSummary<'_> {
+    NodeSummary {
+        level: node.level,
+        plane: rounded(node.plane, 3),
+        factor: node.factor,
+        origin: node.origin,
+        size: node.size,
+        mask_pixels: node.mask.iter().flat_map(|row| row.chunks(2)).map(|run| run[1]).sum(),
+        threshold: rounded(node.threshold, 4),
+        hypotheses: node.hypotheses.iter().map(hypothesis).collect(),
+    }
+}
+
+fn hypothesis(hypothesis: &Hypothesis) -> (&str, &str, usize, f64, f64) {
+    let values = || hypothesis.images.iter().flat_map(|i| i.rows.iter().flatten()).map(|&v| f64::from(v));
+    let count = values().count().max(1) as f64;
+    let mean = values().sum::<f64>() / count;
+    let spread = (values().map(|v| (v - mean).powi(2)).sum::<f64>() / count).sqrt();
+    let (mean, spread) = (rounded(mean, 2), rounded(spread, 2));
+    (&hypothesis.fault, &hypothesis.sweep, hypothesis.images.len(), mean, spread)
+}

@@ -1,0 +1,239 @@
+//! What can be said on the command line.
+
+use super::output::Failure;
+use crate::artifacts::Artifact;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Compiles a text file that describes an assembly into an inspector for it.
+#[derive(Debug, Parser)]
+#[command(name = "gonogo", version, propagate_version = true, max_term_width = 100)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+    #[command(flatten)]
+    pub global: Global,
+}
+
+#[derive(Debug, Args)]
+pub struct Global {
+    /// When to use colour.
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    pub color: Colour,
+    /// How diagnostics are written.
+    #[arg(long, global = true, value_name = "FORMAT", default_value = "human")]
+    pub message_format: MessageFormat,
+    /// Print the seconds every stage took.
+    #[arg(long, global = true)]
+    pub timings: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Colour {
+    Auto,
+    Always,
+    Never,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MessageFormat {
+    /// With the source, for people.
+    Human,
+    /// One line each.
+    Short,
+    /// One JSON object a line.
+    Json,
+    /// Annotations of GitHub Actions.
+    Github,
+    /// Not available yet.
+    Sarif,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Compile a spec into an inspection model.
+    Compile(Compile),
+    /// Check specs without rendering anything.
+    Check(Check),
+    /// Lay out specs in the one canonical way.
+    Fmt(Fmt),
+    /// Fit a model to its station by photos of correct assemblies.
+    Calibrate(Calibrate),
+    /// Judge photos: exit code 0 all go, 1 any no-go, 2 any that could not be judged.
+    Inspect(Inspect),
+    /// Explain a diagnostic: `gonogo explain E0305`.
+    Explain(Explain),
+    /// Compare the outputs of the stages with blessed ones, or bless them.
+    #[command(subcommand)]
+    Golden(Golden),
+    /// Compile the pattern wheel, calibrate it, and judge the photos that come with it.
+    Demo(Demo),
+}
+
+#[derive(Debug, Args)]
+pub struct Variant {
+    /// Replace the value of a `let`; later wins.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, action = ArgAction::Append)]
+    pub set: Vec<(String, String)>,
+    /// Treat a class of diagnostics as errors: `-D warnings`.
+    #[arg(short = 'D', long = "deny", value_name = "CLASS", value_parser = ["warnings"], action = ArgAction::Append)]
+    pub deny: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct Jobs {
+    /// Threads to use; the result is the same for any number. Default: one per core.
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+}
+
+#[derive(Debug, Args)]
+pub struct Compile {
+    /// The spec, or `-` for standard input.
+    pub spec: PathBuf,
+    /// The station the model is for; the first of the spec unless given.
+    #[arg(long, value_name = "NAME")]
+    pub station: Option<String>,
+    /// Where the model goes: `NAME.model.ron` in the current folder unless given.
+    #[arg(short, long, value_name = "MODEL")]
+    pub output: Option<PathBuf>,
+    /// Write the outputs of these stages; the model itself only if it is among them or `-o` is given.
+    #[arg(long, value_name = "STAGE,…", value_delimiter = ',', value_parser = stages())]
+    pub emit: Vec<Artifact>,
+    /// Write what the outputs depend on, in the syntax of make.
+    #[arg(long, value_name = "FILE")]
+    pub deps: Option<PathBuf>,
+    /// Fail if the compiler would have to choose anything anew. Not available yet.
+    #[arg(long)]
+    pub locked: bool,
+    #[command(flatten)]
+    pub variant: Variant,
+    #[command(flatten)]
+    pub jobs: Jobs,
+}
+
+#[derive(Debug, Args)]
+pub struct Check {
+    /// The specs, or `-` for standard input.
+    #[arg(required = true)]
+    pub specs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub variant: Variant,
+}
+
+#[derive(Debug, Args)]
+pub struct Fmt {
+    /// Change nothing; exit with 1 if a spec is laid out otherwise.
+    #[arg(long)]
+    pub check: bool,
+    /// The specs, or `-` for standard input to standard output.
+    #[arg(required = true)]
+    pub specs: Vec<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct Calibrate {
+    pub model: PathBuf,
+    /// Photos of correct assemblies; one is enough.
+    #[arg(required = true)]
+    pub photos: Vec<PathBuf>,
+    /// Where the calibration goes.
+    #[arg(short, long, value_name = "CALIBRATION", required = true)]
+    pub output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Inspect {
+    pub model: PathBuf,
+    #[arg(required = true)]
+    pub photos: Vec<PathBuf>,
+    /// The station's calibration; without it the lamps and the camera are taken to be as the spec says.
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
+    /// How verdicts are written.
+    #[arg(long, value_name = "FORMAT", default_value = "human")]
+    pub format: VerdictFormat,
+    /// Write every photo with what was found drawn over it, as `DIR/<photo>.png`.
+    #[arg(long, value_name = "DIR")]
+    pub overlay: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum VerdictFormat {
+    Human,
+    /// One JSON object a line and photo.
+    Json,
+    /// One test case a photo.
+    Junit,
+}
+
+#[derive(Debug, Args)]
+pub struct Explain {
+    /// `E0305`
+    pub code: String,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Golden {
+    /// Compare; exit code 1 if anything differs or is missing.
+    Check(GoldenArgs),
+    /// Rewrite the blessed outputs. Refused when CI is set.
+    Bless(GoldenArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct GoldenArgs {
+    #[arg(required = true)]
+    pub specs: Vec<PathBuf>,
+    /// The folder of blessed outputs, one folder a spec in it.
+    #[arg(long, value_name = "DIR", default_value = "golden")]
+    pub dir: PathBuf,
+    /// The stages to compare.
+    #[arg(long, value_name = "STAGE,…", value_delimiter = ',', value_parser = stages(),
+          default_value = "design,brep,contacts,liaison,error-trees,insertion,view")]
+    pub stages: Vec<Artifact>,
+    /// Where outputs that differ are kept.
+    #[arg(long, value_name = "DIR", default_value = "target/golden")]
+    pub keep: PathBuf,
+    #[command(flatten)]
+    pub jobs: Jobs,
+}
+
+#[derive(Debug, Args)]
+pub struct Demo {
+    /// Where the model, the calibration and the overlays go.
+    #[arg(long, value_name = "DIR", default_value = "target/demo")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub jobs: Jobs,
+}
+
+fn stages() -> impl TypedValueParser<Value = Artifact> {
+    let names = Artifact::ALL.iter().map(|s| s.name());
+    PossibleValuesParser::new(names).try_map(|s| Artifact::named(&s).ok_or("no such stage"))
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
+    if name.trim().is_empty() || value.trim().is_empty() {
+        return Err("expected NAME=VALUE".into());
+    }
+    Ok((name.trim().into(), value.trim().into()))
+}
+
+impl Variant {
+    pub fn denies_warnings(&self) -> bool {
+        !self.deny.is_empty()
+    }
+}
+
+impl Jobs {
+    /// Runs `work` on that many threads.
+    pub fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
+        let threads = usize::from(self.jobs.unwrap_or(0));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|e| Failure(format!("cannot start {threads} threads: {e}")))?;
+        Ok(pool.install(work))
+    }
+}

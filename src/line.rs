@@ -1,0 +1,250 @@
+//! What travels down the line beside the work itself: options, diagnostics, artifacts, progress; and the small joints
+//! between one stage's output and the next one's input.
+
+use crate::artifacts::{self, Artifact};
+use crate::assembly::Analysis;
+use crate::assembly::error_tree::ErrorTree;
+use crate::assembly::fault::ErrorMode;
+use crate::assembly::place::place;
+use crate::design::Loaded;
+use crate::design::model::{Design, Part, Station};
+use crate::diag::suggest::nearest;
+use crate::diag::{Diagnostic, Sources};
+use crate::runtime::model::Model;
+use crate::scene::Body;
+use crate::scene::build::{self, Instance};
+use crate::solid::{Quality, Solid, evaluate};
+use crate::train::{Step, shots};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// What to make of a spec.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// The station the model is for; the first one unless given.
+    pub station: Option<String>,
+    /// Replaced values of `let`s; the last of equal names wins.
+    pub set: Vec<(String, String)>,
+    /// What is asked for; the line stops after the last stage it takes.
+    pub wanted: BTreeSet<Artifact>,
+}
+
+/// What came of a spec.
+#[derive(Debug, Default)]
+pub struct Compiled {
+    /// Only if it was asked for and nothing is wrong.
+    pub model: Option<Model>,
+    /// Files by name: `view.ron`, `images/good.png`.
+    pub artifacts: BTreeMap<String, Vec<u8>>,
+    pub diagnostics: Vec<Diagnostic>,
+    /// The texts that the diagnostics point into.
+    pub sources: Sources,
+    /// The files that were read.
+    pub inputs: Vec<String>,
+}
+
+/// The stages as progress tells them, in running order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    Design,
+    Solid,
+    Assembly,
+    View,
+    Plan,
+    Render,
+    Fit,
+    HeldOut,
+    Verify,
+}
+
+impl Stage {
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Design => "design",
+            Stage::Solid => "solid",
+            Stage::Assembly => "assembly",
+            Stage::View => "view",
+            Stage::Plan => "plan",
+            Stage::Render => "render",
+            Stage::Fit => "fit",
+            Stage::HeldOut => "held out",
+            Stage::Verify => "verify",
+        }
+    }
+}
+
+impl From<Step> for Stage {
+    fn from(step: Step) -> Stage {
+        match step {
+            Step::Plan => Stage::Plan,
+            Step::Render => Stage::Render,
+            Step::Fit => Stage::Fit,
+            Step::HeldOut => Stage::HeldOut,
+            Step::Verify => Stage::Verify,
+        }
+    }
+}
+
+/// Units of work done of how many in a stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    pub stage: Stage,
+    pub done: usize,
+    pub total: usize,
+}
+
+/// Told about progress.
+pub type Observer<'a> = dyn Fn(Progress) + Sync + 'a;
+
+/// The conveyor.
+pub(crate) struct Line<'a> {
+    pub options: &'a Options,
+    observer: &'a Observer<'a>,
+    pub out: Compiled,
+    last: Stage,
+}
+
+impl<'a> Line<'a> {
+    pub fn new(options: &'a Options, observer: &'a Observer<'a>) -> Line<'a> {
+        let last = options.wanted.iter().map(|a| a.stage()).max().unwrap_or(Stage::View);
+        Line { options, observer, out: Compiled::default(), last }
+    }
+
+    /// Begins a stage, unless nothing from here on was asked for.
+    pub fn enter(&mut self, stage: Stage) -> Option<()> {
+        (stage <= self.last).then(|| self.tell(stage, 0, 1))
+    }
+
+    pub fn tell(&self, stage: Stage, done: usize, total: usize) {
+        (self.observer)(Progress { stage, done, total });
+    }
+
+    /// What `design` read and found.
+    pub fn loaded(&mut self, loaded: Loaded) -> Option<Design> {
+        self.out.sources = loaded.sources;
+        self.out.inputs = loaded.inputs;
+        self.out.diagnostics.extend(loaded.diagnostics);
+        loaded.design
+    }
+
+    /// The output of a stage that makes nothing when something is wrong.
+    pub fn accept<T>(&mut self, outcome: Result<T, Vec<Diagnostic>>) -> Option<T> {
+        outcome.map_err(|faults| self.out.diagnostics.extend(faults)).ok()
+    }
+
+    /// The output of a stage that goes on in spite of warnings.
+    pub fn check<T>(&mut self, (output, found): (T, Vec<Diagnostic>)) -> Option<T> {
+        let stops = found.iter().any(Diagnostic::is_error);
+        self.out.diagnostics.extend(found);
+        (!stops).then_some(output)
+    }
+
+    /// Keeps an artifact if it is wanted.
+    pub fn emit(&mut self, artifact: Artifact, text: impl FnOnce() -> String) {
+        if self.options.wanted.contains(&artifact) {
+            self.out.artifacts.insert(artifact.file(), text().into_bytes());
+        }
+    }
+
+    pub fn emit_assembly(&mut self, design: &Design, solids: &[Arc<Solid>], analysis: &Analysis, trees: &[ErrorTree]) {
+        self.emit(Artifact::Contacts, || artifacts::contacts(design, solids, analysis));
+        self.emit(Artifact::Liaison, || artifacts::liaison(design, solids, analysis));
+        self.emit(Artifact::ErrorTrees, || artifacts::error_trees(design, trees));
+        self.emit(Artifact::ObjectTree, || artifacts::object_tree(design, trees));
+        self.emit(Artifact::Insertion, || artifacts::insertion(design, analysis));
+    }
+
+    pub fn emit_images(&mut self, pictures: impl FnOnce() -> Vec<(String, Vec<u8>)>) {
+        if self.options.wanted.contains(&Artifact::Images) {
+            self.out.artifacts.extend(pictures());
+        }
+    }
+}
+
+/// The station of that name, or the first.
+pub(crate) fn station<'a>(design: &'a Design, name: Option<&str>) -> Result<&'a Station, Vec<Diagnostic>> {
+    let wanted = |s: &&Station| name.is_none_or(|n| s.name == n);
+    design.stations.iter().find(wanted).ok_or_else(|| vec![no_station(design, name.unwrap_or_default())])
+}
+
+fn no_station(design: &Design, name: &str) -> Diagnostic {
+    let names: Vec<&str> = design.stations.iter().map(|s| s.name.as_str()).collect();
+    let span = design.stations.first().map(|s| s.span).unwrap_or_default();
+    let fault = Diagnostic::error("E0201", span, format!("no station `{name}`"))
+        .label("the stations begin here")
+        .note(format!("this spec has: {}", names.join(", ")));
+    match nearest(name, names.iter().copied()) {
+        Some(near) => fault.help(format!("did you mean `--station {near}`?")),
+        None => fault,
+    }
+}
+
+/// Every part at nominal, MMC and LMC. A part that has other faces at its limits than at nominal is an error: it would be
+/// another part (E0403).
+pub(crate) fn shapes(design: &Design) -> Result<Vec<[Arc<Solid>; 3]>, Vec<Diagnostic>> {
+    let limits = [design.nominal(), design.mmc(), design.lmc()];
+    let (mut shapes, mut faults) = (Vec::new(), Vec::new());
+    for part in &design.parts {
+        match at_limits(part, &limits) {
+            Ok(solids) => {
+                faults.extend(changed(part, &solids));
+                shapes.push(solids);
+            }
+            Err(found) => faults.extend(found),
+        }
+    }
+    if faults.is_empty() { Ok(shapes) } else { Err(faults) }
+}
+
+fn at_limits(part: &Part, [nominal, mmc, lmc]: &[Vec<f64>; 3]) -> Result<[Arc<Solid>; 3], Vec<Diagnostic>> {
+    let quality = Quality::default();
+    let at = |values: &[f64]| evaluate(part, values, &quality).map(Arc::new);
+    Ok([at(nominal)?, at(mmc)?, at(lmc)?])
+}
+
+/// E0403: which face comes or goes within tolerance.
+fn changed(part: &Part, [nominal, mmc, lmc]: &[Arc<Solid>; 3]) -> Option<Diagnostic> {
+    let names = |solid: &Solid| -> BTreeSet<String> { solid.faces.iter().map(|f| f.name.clone()).collect() };
+    let own = names(nominal);
+    let at = |limit: &str, solid: &Solid| -> Option<String> {
+        let there = names(solid);
+        let gone = own.difference(&there).next().map(|f| format!("at {limit} the face `{f}` is gone"));
+        let came =
+            there.difference(&own).next().map(|f| format!("at {limit} there is a face `{f}` that nominal has not"));
+        let count = (nominal.faces.len(), solid.faces.len());
+        let more = (count.0 != count.1).then(|| format!("nominal has {} faces, {limit} has {}", count.0, count.1));
+        gone.or(came).or(more)
+    };
+    let what = at("MMC", mmc).or_else(|| at("LMC", lmc))?;
+    let message = format!("`{}` changes its shape within tolerance: {what}", part.name);
+    Some(Diagnostic::error("E0403", part.span, message).label("not one shape but several").note(
+        "an inspector is trained on one shape; keep walls and steps wider than their tolerances, or tighten these",
+    ))
+}
+
+/// One solid per component at nominal.
+pub(crate) fn per_component(design: &Design, shapes: &[[Arc<Solid>; 3]]) -> Vec<Arc<Solid>> {
+    design.components.iter().map(|c| shapes[c.part][0].clone()).collect()
+}
+
+/// The nominal assembly in the middle of where it may stand.
+pub(crate) fn bodies(design: &Design, station: &Station, solids: &[Arc<Solid>]) -> Vec<Body> {
+    let finish = |part: usize| build::finish_nominal(&design.materials[design.parts[part].material]);
+    let instance = Instance {
+        solids: solids.iter().cloned().map(Some).collect(),
+        poses: place(design, &design.nominal()),
+        finishes: design.components.iter().map(|c| finish(c.part)).collect(),
+    };
+    build::bodies(&instance, shots::standing(station).map(|[low, high]| (low + high) / 2.0))
+}
+
+/// Per component: no modelled fault carries it away, so it may serve to locate the assembly.
+pub(crate) fn datum(design: &Design, modes: &[ErrorMode]) -> Vec<bool> {
+    (0..design.components.len()).map(|c| modes.iter().all(|m| m.component != c)).collect()
+}
+
+/// Digest of the design as resolved: layout and comments of the spec do not count, overridden values do.
+pub(crate) fn digest(design: &Design) -> String {
+    let text = ron::to_string(design).expect("plain data always serialises");
+    format!("blake3:{}", blake3::hash(text.as_bytes()).to_hex())
+}
