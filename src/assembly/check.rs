@@ -250,7 +250,7 @@ mod tests {
     /// A plate with a hole and a pin in it: pin diameter with its limits, offset, height.
     fn pinned(d: f64, limits: [f64; 2], x: f64, z: f64) -> sample::Assembly {
         let mut shop = sample::Shop::default();
-        let plate = shop.plate("plate", [5.0, 0.0], [20.0, 0.0], &[sample::Hole::new("hole", 0.0, 0.0, 6.0, 0.012)]);
+        let plate = shop.plate("plate", [5.0, 0.0], [20.0, 0.0], &[sample::Cut::hole("hole", 0.0, 0.0, 6.0, 0.012)]);
         let pin = shop.pin("pin", &[("shank", d, d, limits, 10.0)]);
         shop.place("plate", plate, [0.0; 3], 0.0, 0.0);
         shop.place("pin", pin, [x, 0.0, z], 0.0, 0.0);

@@ -46,7 +46,7 @@ impl Insertion {
 /// Bodies that enter each other less than this (mm) along the direction do not block.
 const DEPTH_TOLERANCE: f64 = 0.02;
 /// Cells across the region two bodies share, and the least side of a cell (mm).
-const CELLS_ACROSS: f64 = 100.0;
+const CELLS_ACROSS: f64 = 64.0;
 const FINEST_CELL: f64 = 0.05;
 /// Directions tried, those with the largest contacts first: a bound on the time spent.
 const MOST_AXES: usize = 6;
@@ -310,6 +310,31 @@ impl Peeled {
     }
 }
 
+/// How far apart the exploded view sets what is removed round after round (mm).
+const EXPLODED_GAP: f64 = 5.0;
+
+/// The exploded view (Fig. 7): how far each component moves (mm), so that every round clears those that stay longer.
+/// `poses` as the solids: one per component.
+pub fn exploded(insertion: &Insertion, solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
+    let mut shifts = vec![Vector3::zeros(); solids.len()];
+    let reach = |c: usize, along: &Vector3<f64>, shift: &Vector3<f64>| {
+        let heights = solids[c].mesh.positions.iter().map(|p| ((poses[c] * p).coords + shift).dot(along));
+        heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| [low.min(h), high.max(h)])
+    };
+    let mut placed: Vec<usize> =
+        (0..solids.len()).filter(|c| insertion.rounds.iter().all(|r| !r.contains(c))).collect();
+    for round in insertion.rounds.iter().rev() {
+        for c in round {
+            let along = insertion.direction(*c).into_inner();
+            let tops = placed.iter().map(|p| reach(*p, &along, &shifts[*p])[1]);
+            let lift = tops.fold(f64::NEG_INFINITY, f64::max) + EXPLODED_GAP - reach(*c, &along, &shifts[*c])[0];
+            shifts[*c] = along * lift.max(0.0);
+        }
+        placed.extend(round);
+    }
+    shifts
+}
+
 /// The removal order in the user's names, for goldens and `--emit insertion`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InsertionSummary {
@@ -357,10 +382,26 @@ mod tests {
     }
 
     #[test]
+    fn the_exploded_view_sets_round_above_round() {
+        let a = sample::pattern_wheel();
+        let found = analyse(&a);
+        let poses = place(&a.design, &a.design.nominal());
+        let shifts = exploded(&found, &a.solids, &poses);
+        assert_eq!(shifts[0], Vector3::zeros());
+        let ends = |c: usize| {
+            let z = a.solids[c].mesh.positions.iter().map(|p| (poses[c] * p).z + shifts[c].z);
+            z.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)])
+        };
+        for pair in found.rounds.windows(2) {
+            assert!(pair[0].iter().all(|c| pair[1].iter().all(|below| ends(*c)[0] > ends(*below)[1] + 4.9)));
+        }
+    }
+
+    #[test]
     fn a_pin_with_two_heads_is_locked_to_its_plate() {
         let mut shop = sample::Shop::default();
         let base = shop.plate("base", [1.0, 0.0], [30.0, 0.0], &[]);
-        let plate = shop.plate("plate", [2.0, 0.0], [20.0, 0.0], &[sample::Hole::new("hole", 0.0, 0.0, 4.0, 0.0)]);
+        let plate = shop.plate("plate", [2.0, 0.0], [20.0, 0.0], &[sample::Cut::hole("hole", 0.0, 0.0, 4.0, 0.0)]);
         let heads =
             [("foot", 6.0, 6.0, [0.0; 2], 2.0), ("shank", 4.0, 4.0, [0.0; 2], 2.0), ("head", 6.0, 6.0, [0.0; 2], 2.0)];
         let rivet = shop.pin("rivet", &heads);

@@ -40,34 +40,3 @@ pub fn analyse(design: &Design, solids: &[Arc<Solid>]) -> (Analysis, Vec<Diagnos
     let diagnostics = check::check(design, solids, &liaison, &found.clashes, &entering);
     (Analysis { liaison, insertion }, diagnostics)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::time::Instant;
-
-    #[test]
-    #[ignore = "a measurement"]
-    fn time() {
-        let a = sample::pattern_wheel();
-        for _ in 0..3 {
-            let t = Instant::now();
-            let found = contact::find(&a.design, &a.solids);
-            println!("contacts {:?}", t.elapsed());
-            let liaison = liaison::Liaison::new(a.design.components.len(), found.contacts);
-            let t = Instant::now();
-            let (insertion, entering) = insertion::take_apart(&a.design, &a.solids, &liaison);
-            println!("insertion {:?}", t.elapsed());
-            let t = Instant::now();
-            check::check(&a.design, &a.solids, &liaison, &found.clashes, &entering);
-            println!("check {:?}", t.elapsed());
-            let t = Instant::now();
-            let modes = fault::modes(&a.design, &liaison, &insertion, &a.solids);
-            println!("modes {:?}", t.elapsed());
-            let t = Instant::now();
-            let m = modes.iter().find(|m| m.kind == fault::FaultKind::Misplaced).unwrap();
-            fault::apply(m, [0.3, 0.5, 0.0], &a.solids, &place::place(&a.design, &a.design.nominal()));
-            println!("apply {:?}", t.elapsed());
-        }
-    }
-}
