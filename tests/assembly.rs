@@ -1,0 +1,117 @@
+//! What the paper says of its pattern wheel (section III), asked of the spec a user would write.
+
+use gonogo::assembly::contact::ContactKind::{Cylinder, Plane};
+use gonogo::assembly::fault::{self, ErrorMode, FaultKind, Motion};
+use gonogo::assembly::{Analysis, analyse, liaison, place::place};
+use gonogo::design::{load, model::Design};
+use gonogo::diag::Diagnostic;
+use gonogo::solid::{Quality, Solid, evaluate};
+use nalgebra::{Point3, Vector3};
+use std::sync::Arc;
+
+struct Wheel {
+    design: Design,
+    solids: Vec<Arc<Solid>>,
+    analysis: Analysis,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl Wheel {
+    fn new() -> Self {
+        let design = load("specs/pattern_wheel.gng", &|path| std::fs::read_to_string(path), &[]).design.unwrap();
+        let nominal = design.nominal();
+        let part = |p| Arc::new(evaluate(p, &nominal, &Quality::default()).unwrap());
+        let parts: Vec<Arc<Solid>> = design.parts.iter().map(part).collect();
+        let solids: Vec<Arc<Solid>> = design.components.iter().map(|c| parts[c.part].clone()).collect();
+        let (analysis, diagnostics) = analyse(&design, &solids);
+        Wheel { design, solids, analysis, diagnostics }
+    }
+
+    fn index(&self, name: &str) -> usize {
+        self.design.components.iter().position(|c| c.name == name).unwrap()
+    }
+
+    fn name(&self, component: usize) -> &str {
+        &self.design.components[component].name
+    }
+
+    fn touching(&self, name: &str) -> Vec<&str> {
+        self.analysis.liaison.neighbours(self.index(name)).into_iter().map(|c| self.name(c)).collect()
+    }
+
+    fn modes(&self) -> Vec<ErrorMode> {
+        fault::modes(&self.design, &self.analysis.liaison, &self.analysis.insertion, &self.solids)
+    }
+}
+
+#[test]
+fn the_liaison_diagram_is_the_papers() {
+    let wheel = Wheel::new();
+    let pins = ["alignment_pin[1]", "alignment_pin[2]", "alignment_pin[3]"];
+    assert_eq!(wheel.touching("shaft"), ["gear"]);
+    assert_eq!(wheel.touching("hd_pin"), ["wheel_a1", "wheel_a2"]);
+    assert_eq!(wheel.touching("unlatch_pin"), ["wheel_a1", "wheel_a2"]);
+    for pin in pins {
+        assert_eq!(wheel.touching(pin), ["gear", "locking_ring", "wheel_a1", "wheel_a2"]);
+    }
+    assert_eq!(wheel.touching("locking_ring"), ["gear", pins[0], pins[1], pins[2]]);
+    let liaison = &wheel.analysis.liaison;
+    let kinds =
+        |a: &str, b: &str| -> Vec<_> { liaison.between(wheel.index(a), wheel.index(b)).map(|c| c.kind).collect() };
+    assert_eq!(kinds("gear", "locking_ring"), [Plane]);
+    assert_eq!(kinds("hd_pin", "wheel_a1"), [Cylinder]);
+    assert_eq!(kinds("shaft", "gear"), [Cylinder]);
+}
+
+#[test]
+fn the_summary_names_surfaces_as_the_spec_does() {
+    let wheel = Wheel::new();
+    let summary = liaison::summary(&wheel.design, &wheel.solids, &wheel.analysis.liaison);
+    let pair = summary.liaisons.iter().find(|p| p.a == "gear" && p.b == "shaft").unwrap();
+    assert_eq!(pair.contacts[0].faces, ["bore.side", "stem.side"]);
+    assert_eq!(pair.contacts[0].gap, [0.005, 0.029]);
+    let rests = summary.liaisons.iter().find(|p| p.a == "gear" && p.b == "locking_ring").unwrap();
+    assert_eq!((rests.contacts[0].gap, rests.contacts[0].fit), ([0.0, 0.0], None));
+}
+
+#[test]
+fn everything_is_inserted_along_one_axis_and_nothing_interferes() {
+    let wheel = Wheel::new();
+    let insertion = &wheel.analysis.insertion;
+    assert_eq!(insertion.common, Some([0.0, 0.0, 1.0]));
+    let rounds: Vec<Vec<&str>> = insertion.rounds.iter().map(|r| r.iter().map(|c| wheel.name(*c)).collect()).collect();
+    assert_eq!(rounds[0], ["shaft", "wheel_a2", "hd_pin", "unlatch_pin"]);
+    assert_eq!(rounds[1], ["wheel_a1"]);
+    assert_eq!(rounds[3], ["locking_ring"]);
+    assert!(wheel.diagnostics.iter().all(|d| d.code == "W0502"), "{:#?}", wheel.diagnostics);
+}
+
+#[test]
+fn only_the_top_wheel_can_be_misplaced_and_it_lies_on_the_pins() {
+    let wheel = Wheel::new();
+    let modes = wheel.modes();
+    let misplaced: Vec<&ErrorMode> = modes.iter().filter(|m| m.kind == FaultKind::Misplaced).collect();
+    assert_eq!(misplaced.iter().map(|m| wheel.name(m.component)).collect::<Vec<_>>(), ["wheel_a2"]);
+    let mode = misplaced[0];
+    let Motion::Turn(turn) = &mode.motion else { panic!("{mode:?}") };
+    assert_eq!(turn.ranges.len(), 2, "both ways: {turn:?}");
+    let poses = place(&wheel.design, &wheel.design.nominal());
+    for u in [[0.1, 0.0, 0.0], [0.8, 0.4, 0.0], [0.9, 1.0, 0.0]] {
+        let pose = fault::apply(mode, u, &wheel.solids, &poses).pose.unwrap();
+        let lift = (pose * Point3::origin()).z - 18.0;
+        let tilt = (pose.rotation * Vector3::z()).angle(&Vector3::z()).to_degrees();
+        assert!((2.59..4.0).contains(&lift) && tilt < 6.0, "{u:?}: lift {lift}, tilt {tilt}");
+    }
+    let datum: Vec<&str> = fault::datum(&wheel.analysis.liaison, mode).into_iter().map(|c| wheel.name(c)).collect();
+    assert_eq!(datum, ["gear", "shaft", "locking_ring", "wheel_a1"]);
+}
+
+#[test]
+fn every_watched_component_can_be_missing_or_not_seated() {
+    let wheel = Wheel::new();
+    let modes = wheel.modes();
+    for watch in &wheel.design.inspect.watch {
+        let kinds: Vec<FaultKind> = modes.iter().filter(|m| m.component == watch.component).map(|m| m.kind).collect();
+        assert_eq!(kinds[..2], [FaultKind::Missing, FaultKind::NotSeated], "{}", wheel.name(watch.component));
+    }
+}
