@@ -77,10 +77,12 @@ struct SharedCurve {
 /// Curves of all pairs of surfaces whose leaves come near each other.
 fn shared_curves(tree: &Tree) -> Result<Vec<SharedCurve>, Vec<Diagnostic>> {
     let mut pool = Pool::new(tree);
+    let material = tree.material().widened(tolerance::CULL);
     let mut known: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (i, first) in tree.leaves.iter().enumerate() {
         for second in &tree.leaves[i..] {
-            let Some(both) = first.bounds.common(&second.bounds.widened(tolerance::CULL)) else { continue };
+            let both = first.bounds.common(&second.bounds.widened(tolerance::CULL));
+            let Some(both) = both.and_then(|b| b.common(&material)) else { continue };
             for (a, b) in side_pairs(first, second) {
                 if let std::collections::btree_map::Entry::Vacant(entry) = known.entry((a, b)) {
                     match intersect(&tree.surfaces[a], &tree.surfaces[b]) {
@@ -259,19 +261,19 @@ impl Corners {
     }
 }
 
-/// What a leaf says near the middle of an arc.
-enum Nearby {
-    Outside,
-    /// Inside as far as the surfaces through the curve allow: (place in the curve's list, sense).
-    Within(Vec<(usize, f64)>),
+/// A leaf that holds the middle of an arc, as far as the surfaces through the curve allow.
+struct Nearby {
+    leaf: usize,
+    /// Its sides through the curve: (place in the curve's list, sense).
+    through: Vec<(usize, f64)>,
 }
 
 /// The faces that end at the arc: sheets that bound the solid on one side of it only, or with different senses.
 fn uses(tree: &Tree, curve: &SharedCurve, arc: &Arc) -> Vec<Use> {
     let t = (arc.span[0] + arc.span[1]) / 2.0;
     let (middle, tangent) = (curve.locus.at(t), curve.locus.tangent(t));
-    let leaves: Vec<Nearby> = tree.leaves.iter().map(|l| nearby(tree, curve, l, &middle)).collect();
-    if leaves.iter().all(|l| matches!(l, Nearby::Outside)) {
+    let leaves: Vec<Nearby> = (0..tree.leaves.len()).filter_map(|l| nearby(tree, curve, l, &middle)).collect();
+    if leaves.is_empty() {
         return Vec::new();
     }
     let mut uses = Vec::new();
@@ -291,19 +293,19 @@ fn uses(tree: &Tree, curve: &SharedCurve, arc: &Arc) -> Vec<Use> {
     uses
 }
 
-fn nearby(tree: &Tree, curve: &SharedCurve, leaf: &Leaf, p: &Point3<f64>) -> Nearby {
-    if !leaf.bounds.widened(tolerance::CULL).holds(p) {
-        return Nearby::Outside;
+fn nearby(tree: &Tree, curve: &SharedCurve, leaf: usize, p: &Point3<f64>) -> Option<Nearby> {
+    if !tree.leaves[leaf].bounds.widened(tolerance::CULL).holds(p) {
+        return None;
     }
     let mut through = Vec::new();
-    for side in &leaf.sides {
+    for side in &tree.leaves[leaf].sides {
         match curve.surfaces.binary_search(&side.surface) {
             Ok(place) => through.push((place, side.sense)),
-            Err(_) if tree.surfaces[side.surface].distance(p) * side.sense > 0.0 => return Nearby::Outside,
+            Err(_) if tree.surfaces[side.surface].distance(p) * side.sense > 0.0 => return None,
             Err(_) => {}
         }
     }
-    Nearby::Within(through)
+    Some(Nearby { leaf, through })
 }
 
 /// Whether the sheet of the curve's surface `place`, a step from the arc along `step`, bounds the solid: with its
@@ -318,16 +320,17 @@ fn sheet(
 ) -> Option<(bool, usize)> {
     let signs: Vec<f64> =
         (0..curve.surfaces.len()).map(|other| sign(tree, curve, place, other, middle, step)).collect();
-    let holds = |leaf: usize, side: f64| match &leaves[leaf] {
-        Nearby::Outside => false,
-        Nearby::Within(through) => {
-            through.iter().all(|&(at, sense)| sense * if at == place { side } else { signs[at] } < 0.0)
-        }
+    let holds = |near: &Nearby, side: f64| {
+        near.through.iter().all(|&(at, sense)| sense * if at == place { side } else { signs[at] } < 0.0)
     };
-    let (below, above) = (tree.inside(|l| holds(l, -1.0)), tree.inside(|l| holds(l, 1.0)));
-    let has_side = |leaf: usize| matches!(&leaves[leaf], Nearby::Within(t) if t.iter().any(|(at, _)| *at == place));
-    let owner = (0..leaves.len()).find(|&l| has_side(l) && (holds(l, -1.0) || holds(l, 1.0)));
-    (below != above).then_some((below, owner?))
+    let inside = |side: f64| tree.inside(leaves.iter().filter(|l| holds(l, side)).map(|l| l.leaf));
+    let (below, above) = (inside(-1.0), inside(1.0));
+    if below == above {
+        return None;
+    }
+    let is_side =
+        |near: &&Nearby| near.through.iter().any(|(at, _)| *at == place) && (holds(near, -1.0) || holds(near, 1.0));
+    leaves.iter().find(is_side).map(|owner| (below, owner.leaf))
 }
 
 /// Sign of the distance from surface `other` after a step along `step` on surface `place`.

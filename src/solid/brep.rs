@@ -276,7 +276,8 @@ fn whole_spheres(tree: &Tree, drafts: &[Draft]) -> Vec<Draft> {
                 d * s.sense < 0.0
             })
         };
-        let (below, above) = (tree.inside(|l| holds(l, -1.0)), tree.inside(|l| holds(l, 1.0)));
+        let inside = |side: f64| tree.inside((0..tree.leaves.len()).filter(|l| holds(*l, side)));
+        let (below, above) = (inside(-1.0), inside(1.0));
         let draft = Draft { sheet: (i, below), loops: Vec::new(), north: true, owner: (0, 0) };
         (below != above).then_some(draft)
     };

@@ -107,13 +107,28 @@ impl<'a> Tree<'a> {
         Ok(tree)
     }
 
-    /// Whether a point is in the part, given for each leaf whether it is in the leaf.
-    pub fn inside(&self, in_leaf: impl Fn(usize) -> bool) -> bool {
-        self.features.iter().fold(false, |inside, (op, leaves)| match op {
-            Op::Add => inside || leaves.clone().any(&in_leaf),
-            Op::Cut => inside && !leaves.clone().any(&in_leaf),
-            Op::Keep => inside && leaves.clone().any(&in_leaf),
+    /// Whether a point is in the part, given the leaves it is in, ascending.
+    pub fn inside(&self, leaves: impl Iterator<Item = usize>) -> bool {
+        let mut leaves = leaves.peekable();
+        self.features.iter().fold(false, |inside, (op, range)| {
+            let mut within = false;
+            while leaves.next_if(|l| *l < range.end).is_some() {
+                within = true;
+            }
+            match op {
+                Op::Add => inside || within,
+                Op::Cut => inside && !within,
+                Op::Keep => inside && within,
+            }
         })
+    }
+
+    /// A box round all material added: no face lies outside it.
+    pub fn material(&self) -> Bounds {
+        let mut all = Bounds::empty();
+        let added = self.features.iter().filter(|f| f.0 == Op::Add).flat_map(|f| f.1.clone());
+        added.flat_map(|l| [self.leaves[l].bounds.low, self.leaves[l].bounds.high]).for_each(|p| all.include(&p));
+        all
     }
 
     /// Whether `p` lies in the leaf or within tolerance of it, not asking the surface `but`.

@@ -5,7 +5,7 @@
 //! but on a sphere, where both its sides share them.
 
 use super::ring::{Grid, Node, Outline, Ring, offsets};
-use super::{Face, Quality, Solid, Surface, TriMesh};
+use super::{Face, Quality, Solid, Surface, TriMesh, tolerance};
 use nalgebra::Point3;
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
@@ -126,6 +126,10 @@ fn girth(surface: &Surface, outline: &Outline) -> f64 {
 /// Adds the triangles of one face.
 fn fill(solid: &Solid, face: usize, patch: &Patch, mesh: &mut TriMesh) -> Option<()> {
     let surface = solid.surface(face);
+    if let Some(triangles) = strip(surface, patch) {
+        triangles.into_iter().for_each(|t| add_triangle(solid, face, t, mesh));
+        return Some(());
+    }
     let mut nodes: Vec<Node> = Vec::new();
     let mut border: Vec<[usize; 2]> = Vec::new();
     for ring in std::iter::once(&patch.outline.outer).chain(&patch.outline.holes) {
@@ -141,6 +145,60 @@ fn fill(solid: &Solid, face: usize, patch: &Patch, mesh: &mut TriMesh) -> Option
         add_triangle(solid, face, corners.map(|i| nodes[i]), mesh);
     }
     Some(())
+}
+
+/// Triangles between two rows of nodes along circles about the axis: most faces of cylinders and cones, and flat
+/// quadrangles whose sides run along the chart.
+fn strip(surface: &Surface, patch: &Patch) -> Option<Vec<[Node; 3]>> {
+    let outer = &patch.outline.outer;
+    if !patch.inner.is_empty() || !patch.outline.holes.is_empty() || matches!(surface, Surface::Sphere { .. }) {
+        return None;
+    }
+    let reach = outer.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |r, n| [r[0].min(n.uv[1]), r[1].max(n.uv[1])]);
+    let level = |n: &Node, v: f64| (n.uv[1] - v).abs() < tolerance::POINT;
+    if reach[1] - reach[0] < tolerance::WELD || !outer.iter().all(|n| level(n, reach[0]) || level(n, reach[1])) {
+        return None;
+    }
+    let start = (0..outer.len())
+        .find(|i| level(&outer[*i], reach[0]) && !level(&outer[(i + outer.len() - 1) % outer.len()], reach[0]))?;
+    let turned = outer[start..].iter().chain(&outer[..start]).copied();
+    let (low, mut high): (Vec<Node>, Vec<Node>) = turned.partition(|n| level(n, reach[0]));
+    high.reverse();
+    let ascends = |row: &[Node]| row.windows(2).all(|w| w[0].uv[0] < w[1].uv[0]);
+    (ascends(&low) && ascends(&high)).then(|| zipped(&low, &high))
+}
+
+/// Triangles between two rows of ascending u, the one that lags being advanced.
+fn zipped(low: &[Node], high: &[Node]) -> Vec<[Node; 3]> {
+    let mut triangles = Vec::with_capacity(low.len() + high.len());
+    let (mut i, mut j) = (0, 0);
+    loop {
+        let next = |row: &[Node], k: usize| row.get(k + 1).map_or(f64::INFINITY, |n| n.uv[0]);
+        let (a, b) = (next(low, i), next(high, j));
+        if a.is_infinite() && b.is_infinite() {
+            return triangles;
+        }
+        if a <= b {
+            triangles.push([low[i], low[i + 1], high[j]]);
+            i += 1;
+        } else {
+            triangles.push([low[i], high[j + 1], high[j]]);
+            j += 1;
+        }
+    }
+}
+
+/// Share of a face's size that its nodes are shaken by before they are triangulated.
+const SHAKE: f64 = 1e-9;
+
+/// Points moved a hair's breadth, each its own way: exact predicates are slow on points of one circle, of which every
+/// round face is full, and any of their triangulations is as good as another.
+fn shaken(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let reach = points.iter().fold(0.0, |r: f64, p| r.max(p[0].abs()).max(p[1].abs()));
+    // Low-discrepancy steps (golden ratio and the root of two): no two neighbours move alike.
+    let move_by = |i: usize, step: f64| ((i as f64 * step).fract() - 0.5) * reach * SHAKE;
+    let place = |(i, p): (usize, &[f64; 2])| [p[0] + move_by(i, 0.618_033_988_75), p[1] + move_by(i, 0.414_213_562_37)];
+    points.iter().enumerate().map(place).collect()
 }
 
 /// Adds a triangle given counter-clockwise in the chart; one with two corners at a pole is no triangle.
@@ -160,7 +218,8 @@ fn add_triangle(solid: &Solid, face: usize, [a, b, c]: [Node; 3], mesh: &mut Tri
 fn delaunay(points: &[[f64; 2]], border: &[[usize; 2]]) -> Option<Vec<[usize; 3]>> {
     let (firsts, place) = welded(points);
     let border: Vec<[usize; 2]> = border.iter().map(|e| e.map(|i| place[i])).filter(|[a, b]| a != b).collect();
-    let vertices: Vec<Point2<f64>> = firsts.iter().map(|i| Point2::new(points[*i][0], points[*i][1])).collect();
+    let distinct: Vec<[f64; 2]> = firsts.iter().map(|i| points[*i]).collect();
+    let vertices: Vec<Point2<f64>> = shaken(&distinct).into_iter().map(|p| Point2::new(p[0], p[1])).collect();
     let mut crossed = false;
     let cdt: ConstrainedDelaunayTriangulation<Point2<f64>> =
         ConstrainedDelaunayTriangulation::try_bulk_load_cdt(vertices, border.clone(), |_| crossed = true).ok()?;
