@@ -10,7 +10,7 @@
 //! Merging of equal neighbours is implied: an arc with the same face on both sides is no edge.
 
 use super::csg::{Bounds, Leaf, Tree};
-use super::intersect::intersect;
+use super::intersect::{Oblique, intersect, meet};
 use super::locus::Locus;
 use super::tolerance;
 use crate::diag::Diagnostic;
@@ -87,7 +87,11 @@ fn shared_curves(tree: &Tree) -> Result<Vec<SharedCurve>, Vec<Diagnostic>> {
                 if let std::collections::btree_map::Entry::Vacant(entry) = known.entry((a, b)) {
                     match intersect(&tree.surfaces[a], &tree.surfaces[b]) {
                         Ok(loci) => entry.insert(loci.into_iter().map(|l| pool.intern(l, a, b)).collect()),
-                        Err(_) => return Err(vec![oblique(tree, first, second)]),
+                        Err(Oblique) if meet(tree, (a, b), [first, second], &both) => {
+                            return Err(vec![oblique(tree, first, second)]);
+                        }
+                        // Another pair of leaves on these surfaces may meet.
+                        Err(Oblique) => continue,
                     };
                 }
                 known[&(a, b)].iter().for_each(|c| pool.curves[*c].extend(&both));

@@ -6,7 +6,7 @@
 
 use super::arrange::{Arc, Arrangement, Use};
 use super::csg::Tree;
-use super::measure::{self, Flux};
+use super::measure::{self, Flux, Run};
 use super::ring::{Ring, offsets};
 use super::{Edge, Face, Quality, Solid, Surface, TriMesh};
 use crate::diag::Diagnostic;
@@ -50,8 +50,6 @@ pub(super) fn build(tree: &Tree, mut arrangement: Arrangement, quality: &Quality
 struct Draft {
     sheet: Sheet,
     loops: Vec<Loop>,
-    /// Round the north pole of a sphere.
-    north: bool,
     /// Leaf and side that name it.
     owner: (usize, usize),
 }
@@ -255,11 +253,10 @@ fn draft(tree: &Tree, sheet: Sheet, members: &[usize], rings: &[Ring], loops: &[
     if !sound {
         return Err(vec![internal(tree, "loops of edges do not bound a face")]);
     }
-    let north = sphere && outers == 0 && (winding == 1 || winds == 0);
     let mut order = members.to_vec();
     order.sort_by_key(|i| (!rings[*i].is_outer() && rings[*i].winding != 1, *i));
     let loops = order.iter().map(|i| loops[*i].clone()).collect();
-    Ok(Draft { sheet, loops, north, owner: (0, 0) })
+    Ok(Draft { sheet, loops, owner: (0, 0) })
 }
 
 /// Spheres that nothing cuts have no edge to be found by: one point decides.
@@ -278,7 +275,7 @@ fn whole_spheres(tree: &Tree, drafts: &[Draft]) -> Vec<Draft> {
         };
         let inside = |side: f64| tree.inside((0..tree.leaves.len()).filter(|l| holds(*l, side)));
         let (below, above) = (inside(-1.0), inside(1.0));
-        let draft = Draft { sheet: (i, below), loops: Vec::new(), north: true, owner: (0, 0) };
+        let draft = Draft { sheet: (i, below), loops: Vec::new(), owner: (0, 0) };
         (below != above).then_some(draft)
     };
     tree.surfaces.iter().enumerate().filter_map(whole).collect()
@@ -309,12 +306,13 @@ fn fluxes(tree: &Tree, arrangement: &Arrangement, drafts: &[Draft]) -> Vec<Flux>
     // Seen from the middle of the part, the cones from the faces nearly cancel less.
     let all = tree.leaves.iter().fold(Vector3::zeros(), |s, l| s + l.bounds.low.coords + l.bounds.high.coords);
     let from = Point3::from(all / (2.0 * tree.leaves.len().max(1) as f64));
+    let run = |&(arc, forward): &(usize, bool)| {
+        let arc = &arrangement.arcs[arc];
+        Run { locus: &arrangement.curves[arc.curve], span: arc.span, forward }
+    };
     let flux = |draft: &Draft| {
-        let runs = draft.loops.iter().flatten().map(|&(arc, forward)| {
-            let arc = &arrangement.arcs[arc];
-            (&arrangement.curves[arc.curve], arc.span, forward)
-        });
-        measure::flux(&tree.surfaces[draft.sheet.0], draft.sheet.1, runs, draft.north, &from)
+        let loops: Vec<Vec<Run>> = draft.loops.iter().map(|l| l.iter().map(run).collect()).collect();
+        measure::flux(&tree.surfaces[draft.sheet.0], draft.sheet.1, &loops, &from)
     };
     drafts.iter().map(flux).collect()
 }

@@ -4,6 +4,7 @@
 //! curve is neither (an oblique plane through a cylinder, crossing cylinders) are refused, never approximated.
 
 use super::Surface;
+use super::csg::{Bounds, Leaf, Tree};
 use super::locus::Locus;
 use super::surface::radial;
 use super::tolerance;
@@ -37,6 +38,34 @@ pub(super) fn intersect(a: &Surface, b: &Surface) -> Shared {
         (Cylinder { .. } | Cone { .. }, Cone { .. }) | (Cylinder { .. } | Cone { .. }, Sphere { .. }) => coaxial(a, b),
         _ => intersect(b, a),
     }
+}
+
+/// Least edge of the boxes in which surfaces are looked for, in mm: what comes nearer counts as meeting.
+const NEAR: f64 = 0.02;
+
+/// Whether the sides of two leaves on surfaces `a` and `b` come near each other inside `region`: boxes are halved until
+/// they are too far from either surface, or outside either leaf, for any point of theirs to be on both.
+pub(super) fn meet(tree: &Tree, (a, b): (usize, usize), leaves: [&Leaf; 2], region: &Bounds) -> bool {
+    let mut open = vec![*region];
+    while let Some(cell) = open.pop() {
+        let (middle, extent) = (nalgebra::center(&cell.low, &cell.high), cell.high - cell.low);
+        let reach = extent.norm() / 2.0;
+        let far = |s: usize| tree.surfaces[s].distance(&middle).abs() > reach;
+        let off =
+            |leaf: &&Leaf| leaf.sides.iter().any(|s| tree.surfaces[s.surface].distance(&middle) * s.sense > reach);
+        if far(a) || far(b) || leaves.iter().any(off) {
+            continue;
+        }
+        let longest = extent.imax();
+        if extent[longest] < NEAR {
+            return true;
+        }
+        let (mut low, mut high) = (cell, cell);
+        low.high[longest] = middle[longest];
+        high.low[longest] = middle[longest];
+        open.extend([low, high]);
+    }
+    false
 }
 
 fn parallel(a: &Direction, b: &Direction) -> bool {

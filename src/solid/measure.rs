@@ -1,14 +1,14 @@
 //! Area and volume of a face by the divergence theorem, in closed form.
 //!
-//! In: a surface and the arcs round a face. Out: [`Flux`]. On a closed surface an area element integrates to
-//! `-∮ F(v) dθ` with F the integral along v from the south pole (or apex, or v = 0); F is constant along circles about
-//! the axis and rulings have dθ = 0. Only arcs that are neither are integrated numerically, to rounding.
+//! In: a surface and the loops of arcs round a face. Out: [`Flux`]. The vector area of a face is `½ ∮ r × dr` on any
+//! surface; with it and the area, the flux of `p / 3` through planes, cylinders, cones and spheres follows. The area
+//! itself is the vector area along the normal (plane), `-∮ v du` in the equal-area chart (cylinder, cone), or comes from
+//! the theorem of Gauss and Bonnet (sphere).
 
+use super::Surface;
 use super::locus::Locus;
-use super::surface::{across, radial};
-use super::{Surface, tolerance};
 use nalgebra::{Point3, Vector3};
-use std::f64::consts::{FRAC_PI_4, TAU};
+use std::f64::consts::TAU;
 
 /// Area (mm²) of a face and the volume (mm³) of the cone from a point to it, signed by its outward side.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,125 +17,92 @@ pub(super) struct Flux {
     pub volume: f64,
 }
 
-/// Flux through the face left of `runs` = (curve, parameters, forward). `north`: the north pole of a sphere is inside.
-pub(super) fn flux<'a>(
-    surface: &Surface,
-    outward: bool,
-    runs: impl Iterator<Item = (&'a Locus, [f64; 2], bool)>,
-    north: bool,
-    from: &Point3<f64>,
-) -> Flux {
-    let (mut area, mut moment) = (0.0, 0.0);
-    for (locus, span, forward) in runs {
-        let way = if forward == outward { 1.0 } else { -1.0 };
-        let (a, m) = match surface {
-            Surface::Plane { .. } => (sweep(surface, locus, span), 0.0),
-            _ => around(surface, locus, span, from),
+/// An arc of a loop: its curve, its parameters, and whether the loop runs along it forward.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Run<'a> {
+    pub locus: &'a Locus,
+    pub span: [f64; 2],
+    pub forward: bool,
+}
+
+impl Run<'_> {
+    fn way(&self) -> f64 {
+        if self.forward { 1.0 } else { -1.0 }
+    }
+
+    /// Unit direction of travel at the start (0) or the end (1).
+    fn heading(&self, end: usize) -> (Point3<f64>, Vector3<f64>) {
+        let t = self.span[if self.forward { end } else { 1 - end }];
+        (self.locus.at(t), self.locus.tangent(t) * self.way())
+    }
+
+    /// `½ ∫ r × dr` in the direction of travel, r from `from`.
+    fn vector_area(&self, from: &Point3<f64>) -> Vector3<f64> {
+        let [a, b] = self.span;
+        let swept = match self.locus {
+            Locus::Line { .. } => (self.locus.at(a) - from).cross(&(self.locus.at(b) - from)),
+            Locus::Circle { centre, axis, radius, .. } => {
+                let chord = self.locus.at(b) - self.locus.at(a);
+                (centre - from).cross(&chord) + axis.into_inner() * (radius * radius * (b - a))
+            }
         };
-        area += way * a;
-        moment += way * m;
+        swept * (self.way() / 2.0)
     }
-    if let (Surface::Plane { normal, offset }, false) = (surface, north) {
-        moment = area * (offset - normal.dot(&from.coords));
-    }
-    if let (Surface::Sphere { radius, .. }, true) = (surface, north) {
-        area += 2.0 * TAU * radius * radius;
-        moment += 2.0 * TAU * radius.powi(3);
-    }
-    Flux { area, volume: moment / 3.0 * if outward { 1.0 } else { -1.0 } }
-}
 
-/// `½ ∫ (x dy - y dx)` along an arc in a plane, from the plane's origin.
-fn sweep(plane: &Surface, locus: &Locus, [a, b]: [f64; 2]) -> f64 {
-    let normal = plane.axis();
-    let turn = |p: Vector3<f64>, q: Vector3<f64>| normal.dot(&p.cross(&q)) / 2.0;
-    match locus {
-        Locus::Line { .. } => turn(locus.at(a) - plane.origin(), locus.at(b) - plane.origin()),
-        Locus::Circle { centre, axis, radius, .. } => {
-            let sector = radius * radius * (b - a) / 2.0 * axis.dot(&normal).signum();
-            sector + turn(centre - plane.origin(), locus.at(b) - locus.at(a))
+    /// Turn about `axis` in the direction of travel, of a circle about that axis; nothing along a ruling.
+    fn turn(&self, axis: &Vector3<f64>) -> f64 {
+        match self.locus {
+            Locus::Line { .. } => 0.0,
+            Locus::Circle { axis: own, .. } => (self.span[1] - self.span[0]) * own.dot(axis).signum() * self.way(),
         }
     }
 }
 
-/// Integrals along v per unit of θ: area, and flux as `fixed + round (e·C)`, where e points from the axis and C from
-/// the reference to the surface's origin.
-struct Column {
-    area: f64,
-    fixed: f64,
-    round: f64,
-}
-
-fn column(surface: &Surface, v: f64, offset: &Vector3<f64>) -> Column {
-    match surface {
-        Surface::Cylinder { radius, .. } => Column { area: radius * v, fixed: radius * radius * v, round: radius * v },
-        Surface::Cone { axis, half_angle, .. } => {
-            let (sin, cos) = half_angle.sin_cos();
-            Column { area: v, fixed: -v * sin * axis.dot(offset), round: v * cos }
-        }
-        Surface::Sphere { radius, .. } => {
-            let w = (v / radius - 1.0).clamp(-1.0, 1.0);
-            let across = (w * (1.0 - w * w).sqrt() + w.asin()) / 2.0 + FRAC_PI_4;
-            let along = (w * w - 1.0) / 2.0 * surface.axis().dot(offset);
-            let square = radius * radius;
-            Column { area: radius * v, fixed: square * (v + along), round: square * across }
-        }
-        Surface::Plane { .. } => Column { area: 0.0, fixed: 0.0, round: 0.0 },
-    }
-}
-
-/// `-∫ F dθ` along an arc on a closed surface: (area, flux).
-fn around(surface: &Surface, locus: &Locus, span: [f64; 2], from: &Point3<f64>) -> (f64, f64) {
+/// Flux through the face left of its loops, seen from its outward side, from the point `from`.
+pub(super) fn flux(surface: &Surface, outward: bool, loops: &[Vec<Run>], from: &Point3<f64>) -> Flux {
+    let sense = if outward { 1.0 } else { -1.0 };
+    let vector: Vector3<f64> = loops.iter().flatten().map(|run| run.vector_area(&surface.origin())).sum();
     let offset = surface.origin() - from;
-    match locus {
-        Locus::Line { .. } => (0.0, 0.0),
-        Locus::Circle { centre, axis, x, y, .. } if about(surface, centre, axis) => {
-            let [a, b] = span;
-            let way = axis.dot(&surface.axis()).signum();
-            let column = column(surface, surface.chart(&locus.at(a))[1], &offset);
-            let out = x * (b.sin() - a.sin()) + y * (a.cos() - b.cos());
-            let turn = way * (b - a);
-            (-column.area * turn, -column.fixed * turn - column.round * way * out.dot(&offset))
-        }
-        Locus::Circle { radius, .. } => numeric(surface, locus, span, *radius, &offset),
-    }
+    let area = match surface {
+        Surface::Plane { normal, .. } => normal.dot(&vector) * sense,
+        Surface::Cylinder { .. } | Surface::Cone { .. } => sense * developed(surface, loops),
+        Surface::Sphere { radius, .. } => radius * radius * spherical_angle(surface, sense, loops),
+    };
+    // p·n = offset·n + the distance of the surface from its own origin along n.
+    let own = match surface {
+        Surface::Plane { .. } | Surface::Cone { .. } => 0.0,
+        Surface::Cylinder { radius, .. } | Surface::Sphere { radius, .. } => *radius,
+    };
+    // The vector area already points outwards, for it follows the loops.
+    let volume = (offset.dot(&vector) + own * area * sense) / 3.0;
+    Flux { area, volume }
 }
 
-/// True when the circle runs about the surface's own axis.
-fn about(surface: &Surface, centre: &Point3<f64>, axis: &nalgebra::Unit<Vector3<f64>>) -> bool {
-    let own = surface.axis();
-    own.cross(axis).norm() < tolerance::DIRECTION
-        && radial(&surface.origin(), &own, centre).norm() < 10.0 * tolerance::POINT
-}
-
-/// Panels of an arc, each integrated by Gauss and Legendre's rule of five points.
-const PANELS: usize = 256;
-const GAUSS: [(f64, f64); 5] = [
-    (0.0, 0.568_888_888_888_888_9),
-    (-0.538_469_310_105_683, 0.478_628_670_499_366_5),
-    (0.538_469_310_105_683, 0.478_628_670_499_366_5),
-    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
-    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
-];
-
-fn numeric(surface: &Surface, locus: &Locus, [a, b]: [f64; 2], speed: f64, offset: &Vector3<f64>) -> (f64, f64) {
+/// `-∮ v du` in the chart of a cylinder or cone.
+fn developed(surface: &Surface, loops: &[Vec<Run>]) -> f64 {
+    let girth = match surface {
+        Surface::Cylinder { radius, .. } => *radius,
+        _ => 1.0,
+    };
     let axis = surface.axis();
-    let (x, y) = across(&axis);
-    let half = (b - a) / PANELS as f64 / 2.0;
-    let (mut area, mut moment) = (0.0, 0.0);
-    for panel in 0..PANELS {
-        let middle = a + half * (2 * panel + 1) as f64;
-        for (node, weight) in GAUSS {
-            let t = middle + half * node;
-            let p = locus.at(t);
-            let q = p - surface.origin();
-            let out = x * q.dot(&x) + y * q.dot(&y);
-            let rho = out.norm();
-            let turn = axis.cross(&out).dot(&locus.tangent(t)) * speed / (rho * rho) * weight * half;
-            let column = column(surface, surface.chart(&p)[1], offset);
-            area -= column.area * turn;
-            moment -= (column.fixed + column.round * out.dot(offset) / rho) * turn;
+    let under = |run: &Run| -surface.chart(&run.locus.at(run.span[0]))[1] * girth * run.turn(&axis);
+    loops.iter().flatten().map(under).sum()
+}
+
+/// Solid angle of a face of a sphere (Gauss and Bonnet): `2πχ`, less the geodesic curvature along its loops, less the
+/// turns at their corners. χ is 2 less the number of loops.
+fn spherical_angle(surface: &Surface, sense: f64, loops: &[Vec<Run>]) -> f64 {
+    let Surface::Sphere { centre, radius } = surface else { return 0.0 };
+    let bend = |run: &Run| match run.locus {
+        Locus::Circle { centre: c, axis, .. } => {
+            (c - centre).dot(axis) / radius * (run.span[1] - run.span[0]) * run.way()
         }
-    }
-    (area, moment)
+        Locus::Line { .. } => 0.0,
+    };
+    let corner = |runs: &[Run], i: usize| {
+        let ((_, came), (p, goes)) = (runs[i].heading(1), runs[(i + 1) % runs.len()].heading(0));
+        surface.normal_at(&p).dot(&came.cross(&goes)).atan2(came.dot(&goes))
+    };
+    let turned = |runs: &Vec<Run>| -> f64 { (0..runs.len()).map(|i| bend(&runs[i]) + corner(runs, i)).sum() };
+    TAU * (2.0 - loops.len() as f64) - sense * loops.iter().map(turned).sum::<f64>()
 }

@@ -3,6 +3,7 @@
 //! In: a surface, edges with their samples, loops. Out: [`Ring`]s, unrolled so that u is continuous, and [`Outline`]s:
 //! one closed polygon round the face and its holes, a face that goes all the way round being cut along a seam.
 
+use super::surface::radial;
 use super::{Edge, Surface, tolerance};
 use nalgebra::Point3;
 
@@ -142,7 +143,7 @@ fn unroll(surface: &Surface, period: f64, points: &[(Point3<f64>, u32)]) -> Vec<
 fn singular(surface: &Surface, p: &Point3<f64>) -> bool {
     match surface {
         Surface::Cone { apex, .. } => (p - apex).norm() < tolerance::WELD,
-        Surface::Sphere { centre, .. } => (p - centre).xy().norm() < tolerance::WELD,
+        Surface::Sphere { centre, .. } => radial(centre, &surface.axis(), p).norm() < tolerance::WELD,
         _ => false,
     }
 }

@@ -20,13 +20,13 @@ pub(super) fn across(axis: &Unit<Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) 
 }
 
 impl Surface {
-    /// Unit vector the surface is built about: the normal of a plane, the axis of a cylinder or cone, world z for a
-    /// sphere.
+    /// Unit vector the surface is built about: the normal of a plane, the axis of a cylinder or cone; for a sphere
+    /// a direction that planes through its centre hardly ever contain, for the chart has its poles there.
     pub fn axis(&self) -> Unit<Vector3<f64>> {
         match self {
             Surface::Plane { normal, .. } => *normal,
             Surface::Cylinder { axis, .. } | Surface::Cone { axis, .. } => *axis,
-            Surface::Sphere { .. } => Vector3::z_axis(),
+            Surface::Sphere { .. } => Unit::new_normalize(Vector3::new(0.3285, 0.4871, 0.8093)),
         }
     }
 

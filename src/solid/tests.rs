@@ -294,6 +294,39 @@ fn a_void_and_a_blind_slot_in_the_rim_work() {
 }
 
 #[test]
+fn a_ball_cut_by_planes_through_its_centre_is_exact() {
+    let wedge = vec![
+        one("ball", Op::Add, ball(10.0), 0.0),
+        feature("octant", Op::Cut, vec![(block(10.0, 10.0, 10.0), pose([5.0, 5.0, 0.0], 0.0))]),
+    ];
+    let half = vec![
+        one("ball", Op::Add, ball(10.0), 0.0),
+        feature("half", Op::Keep, vec![(block(10.0, 20.0, 20.0), pose([5.0, 0.0, -10.0], 0.0))]),
+    ];
+    let full = PI * 1000.0 / 6.0;
+    for (features, volume, area) in [(wedge, full * 7.0 / 8.0, 87.5 * PI + 18.75 * PI), (half, full / 2.0, 75.0 * PI)] {
+        for features in [features.clone(), moved(&features)] {
+            let s = solid(features);
+            assert!((s.volume - volume).abs() < 1e-9, "{} {volume}", s.volume);
+            assert!((s.area - area).abs() < 1e-9, "{} {area}", s.area);
+        }
+    }
+}
+
+#[test]
+fn a_slot_that_passes_a_countersink_is_not_refused() {
+    let features = vec![
+        one("slab", Op::Add, block(40.0, 20.0, 5.0), 0.0),
+        feature("sink", Op::Cut, vec![(cone(4.0, 10.0, 3.0), pose([0.0, 0.0, 2.0], 0.0))]),
+        feature("slot", Op::Cut, vec![(block(2.0, 2.0, 5.0), pose([4.9, 4.9, 0.0], 0.3))]),
+    ];
+    let sink = PI * (4.0 + 10.0 + 25.0);
+    for features in [features.clone(), moved(&features)] {
+        assert!((solid(features).volume - (4000.0 - sink - 20.0)).abs() < 1e-8);
+    }
+}
+
+#[test]
 fn keep_intersects() {
     let s = solid(vec![
         one("bar", Op::Add, block(20.0, 20.0, 5.0), 0.0),
