@@ -8,7 +8,9 @@
 
 use super::vector::Vec3;
 use glam::Vec3A;
-use obvhs::BvhBuildParams;
+use obvhs::splits::split_aabbs_precise;
+use obvhs::triangle::Triangle;
+use obvhs::{Boundable, BvhBuildParams};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
@@ -22,6 +24,12 @@ pub(super) type Corners = [[f32; 3]; 3];
 const BOX_PADDING: f32 = 2e-4;
 /// ... and by this share of the largest coordinate: four roundings of an `f32`.
 const BOX_PADDING_SHARE: f32 = 2.5e-7;
+/// Boxes of more half area than this many mean triangle areas are split, ...
+const SPLIT_ABOVE: f32 = 4.0;
+/// ... if the pieces together are smaller by this factor, ...
+const SPLIT_GAIN: f32 = 1.6;
+/// ... each at most this many times over.
+const SPLIT_ROUNDS: u32 = 5;
 /// A direction component smaller than this is treated as this: keeps 0 · 1/0 out of the box test.
 const LEAST_COMPONENT: f32 = 1e-18;
 
@@ -61,11 +69,12 @@ impl Accel {
         if sound.is_empty() {
             return Accel { bvh: Bvh2::default(), corners: Vec::new(), original: Vec::new() };
         }
-        let boxes: Vec<Aabb> = sound.iter().map(|&i| padded_box(&triangles[i as usize])).collect();
+        let flat: Vec<Triangle> = sound.iter().map(|&i| obvhs_triangle(&triangles[i as usize])).collect();
+        let (boxes, owners) = tight_boxes(&flat);
         // The builder reports its time through this; nobody reads it.
         let mut time = Duration::default();
         let bvh = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut time);
-        let original: Vec<u32> = bvh.primitive_indices.iter().map(|&i| sound[i as usize]).collect();
+        let original: Vec<u32> = bvh.primitive_indices.iter().map(|&i| sound[owners[i as usize] as usize]).collect();
         let corners = original.iter().map(|&i| triangles[i as usize]).collect();
         Accel { bvh, corners, original }
     }
@@ -111,12 +120,26 @@ impl Accel {
     }
 }
 
-/// The box of a triangle, padded so that rounding in the box test cannot lose a hit on its boundary.
-fn padded_box(corners: &Corners) -> Aabb {
-    let [a, b, c] = corners.map(Vec3A::from_array);
-    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-    let pad = BOX_PADDING + BOX_PADDING_SHARE * low.abs().max(high.abs()).max_element();
-    Aabb { min: low - pad, max: high + pad }
+fn obvhs_triangle(corners: &Corners) -> Triangle {
+    let [v0, v1, v2] = corners.map(Vec3A::from_array);
+    Triangle { v0, v1, v2 }
+}
+
+/// Boxes that cover the triangles, and which triangle each belongs to. Flat faces of machined parts come as long thin
+/// triangles, whose boxes are mostly empty: those are covered by several small boxes.
+fn tight_boxes(triangles: &[Triangle]) -> (Vec<Aabb>, Vec<u32>) {
+    let mut boxes: Vec<Aabb> = triangles.iter().map(Triangle::aabb).collect();
+    let mut owners: Vec<u32> = (0..triangles.len() as u32).collect();
+    let area = |t: &Triangle| 0.5 * (t.v1 - t.v0).cross(t.v2 - t.v0).length();
+    let enough = SPLIT_ABOVE * triangles.iter().map(area).sum::<f32>() / triangles.len() as f32;
+    split_aabbs_precise(&mut boxes, &mut owners, triangles, enough, enough, SPLIT_GAIN, SPLIT_GAIN, SPLIT_ROUNDS, 4);
+    (boxes.into_iter().map(padded).collect(), owners)
+}
+
+/// A box padded so that rounding in the box test cannot lose a hit on its boundary.
+fn padded(tight: Aabb) -> Aabb {
+    let pad = BOX_PADDING + BOX_PADDING_SHARE * tight.min.abs().max(tight.max.abs()).max_element();
+    Aabb { min: tight.min - pad, max: tight.max + pad }
 }
 
 /// The ray for the box test. Built by hand: the reciprocal of obvhs replaces components up to 1e-7 by 1e-7, which
@@ -166,7 +189,9 @@ impl Shear {
     /// (t, corner weights) of the hit at 0 < t < reach.
     #[inline(always)]
     fn intersect<const AXIS: usize>(&self, corners: &Corners, reach: f32) -> Option<(f32, [f32; 3])> {
-        let [a, b, c] = [0, 1, 2].map(|i| self.transform::<AXIS>(&corners[i]));
+        let a = self.transform::<AXIS>(&corners[0]);
+        let b = self.transform::<AXIS>(&corners[1]);
+        let c = self.transform::<AXIS>(&corners[2]);
         let mut u = c[0] * b[1] - c[1] * b[0];
         let mut v = a[0] * c[1] - a[1] * c[0];
         let mut w = b[0] * a[1] - b[1] * a[0];

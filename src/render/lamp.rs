@@ -176,6 +176,11 @@ impl Sky {
         self.groups(direction).count() as f32 / self.solid_angle
     }
 
+    /// Whether any patch holds the direction.
+    pub fn covers(&self, direction: Vec3) -> bool {
+        self.patches.iter().any(|p| p.holds(direction))
+    }
+
     /// The light group of every patch that holds the direction.
     pub fn groups(&self, direction: Vec3) -> impl Iterator<Item = usize> {
         self.patches.iter().filter(move |p| p.holds(direction)).map(|p| p.group)

@@ -128,20 +128,15 @@ impl<'a> Tracer<'a> {
 
     /// The last segment: only a lamp at its end matters, so most need no ray.
     fn finish(&self, walk: &Walk, light: &mut [f32]) {
-        let depth = self.segments - 1;
+        let (depth, things) = (self.segments - 1, |ray: &Ray| self.world.occluded_by_things(ray));
         match self.world.lamp_ahead(&walk.ray) {
-            Some((index, hit)) if hit.cosine > 0.0 => {
-                if !self.world.occluded_by_things(&Ray { reach: hit.t, ..walk.ray }) {
-                    self.reach_lamp(walk, index, hit, depth, light);
-                }
+            Some((index, hit)) if hit.cosine > 0.0 && !things(&Ray { reach: hit.t, ..walk.ray }) => {
+                self.reach_lamp(walk, index, hit, depth, light);
             }
-            Some(_) => {}
-            None if self.world.sky.groups(walk.ray.direction).next().is_some() => {
-                if !self.world.occluded_by_things(&walk.ray) {
-                    self.reach_sky(walk, depth, light);
-                }
+            None if self.world.sky.covers(walk.ray.direction) && !things(&walk.ray) => {
+                self.reach_sky(walk, depth, light);
             }
-            None => {}
+            _ => {}
         }
     }
 
@@ -158,11 +153,8 @@ impl<'a> Tracer<'a> {
         let direction = vertex.frame.to_world(local);
         let throughput = walk.throughput * scatter.value / scatter.pdf;
         let goes_on = vertex.spot.geometric.dot(&direction) > 0.0 && throughput > LEAST_THROUGHPUT;
-        goes_on.then(|| Walk {
-            ray: Ray { origin: vertex.origin, direction, reach: f32::INFINITY },
-            throughput,
-            pdf: Some(scatter.pdf),
-        })
+        let ray = Ray { origin: vertex.origin, direction, reach: f32::INFINITY };
+        goes_on.then_some(Walk { ray, throughput, pdf: Some(scatter.pdf) })
     }
 
     /// One set for the surface, and one for every two lamps; the sky counts as a lamp.
