@@ -8,13 +8,13 @@
 
 use super::vector::Vec3;
 use glam::Vec3A;
-use obvhs::splits::split_aabbs_precise;
-use obvhs::triangle::Triangle;
-use obvhs::{Boundable, BvhBuildParams};
+use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::RayHit;
+use obvhs::splits::split_aabbs_precise;
+use obvhs::triangle::Triangle;
 use std::time::Duration;
 
 /// The corners of a triangle (mm), counter-clockwise seen from outside.
@@ -25,7 +25,7 @@ const BOX_PADDING: f32 = 2e-4;
 /// ... and by this share of the largest coordinate: four roundings of an `f32`.
 const BOX_PADDING_SHARE: f32 = 2.5e-7;
 /// Boxes of more half area than this many mean triangle areas are split, ...
-const SPLIT_ABOVE: f32 = 4.0;
+const SPLIT_ABOVE: f32 = 8.0;
 /// ... if the pieces together are smaller by this factor, ...
 const SPLIT_GAIN: f32 = 1.6;
 /// ... each at most this many times over.
@@ -73,7 +73,7 @@ impl Accel {
         let (boxes, owners) = tight_boxes(&flat);
         // The builder reports its time through this; nobody reads it.
         let mut time = Duration::default();
-        let bvh = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut time);
+        let bvh = build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut time);
         let original: Vec<u32> = bvh.primitive_indices.iter().map(|&i| sound[owners[i as usize] as usize]).collect();
         let corners = original.iter().map(|&i| triangles[i as usize]).collect();
         Accel { bvh, corners, original }

@@ -126,7 +126,7 @@ impl FlatLamp {
     }
 }
 
-/// The sky: every patch of every group, sampled as one light.
+/// The sky: every patch of every group, taken as one light.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sky {
     patches: Vec<Patch>,
@@ -137,7 +137,8 @@ pub(super) struct Sky {
 #[derive(Debug, Clone)]
 struct Patch {
     sines: [f32; 2],
-    azimuths: [f32; 2],
+    /// Azimuth covered (rad).
+    width: f32,
     /// Horizontal directions of the two azimuths.
     edges: [[f32; 2]; 2],
     solid_angle: f32,
@@ -153,27 +154,6 @@ impl Sky {
 
     pub fn is_empty(&self) -> bool {
         self.patches.is_empty()
-    }
-
-    /// A direction uniform in solid angle over all patches.
-    pub fn sample(&self, u: [f32; 2]) -> Option<Towards> {
-        let mut rest = u[0] * self.solid_angle;
-        let last = self.patches.len().checked_sub(1)?;
-        let index = (0..last)
-            .find(|&i| {
-                let here = rest < self.patches[i].solid_angle;
-                rest -= if here { 0.0 } else { self.patches[i].solid_angle };
-                here
-            })
-            .unwrap_or(last);
-        let patch = &self.patches[index];
-        let direction = patch.direction([(rest / patch.solid_angle).clamp(0.0, 1.0), u[1]]);
-        Some(Towards { direction, distance: f32::INFINITY, pdf: self.pdf(direction) })
-    }
-
-    /// Density (1/sr) of [`Sky::sample`]: patches may overlap.
-    pub fn pdf(&self, direction: Vec3) -> f32 {
-        self.groups(direction).count() as f32 / self.solid_angle
     }
 
     /// Whether any patch holds the direction.
@@ -201,15 +181,9 @@ impl Patch {
             let (sine, cosine) = sine_cosine(a / TAU);
             [cosine, sine]
         });
-        let solid_angle = (sines[1] - sines[0]) * (azimuths[1] - azimuths[0]);
-        (solid_angle > 0.0).then_some(Patch { sines, azimuths, edges, solid_angle, group: lamp.group })
-    }
-
-    fn direction(&self, u: [f32; 2]) -> Vec3 {
-        let z = self.sines[0] + (self.sines[1] - self.sines[0]) * u[0];
-        let (sine, cosine) = sine_cosine((self.azimuths[0] + (self.azimuths[1] - self.azimuths[0]) * u[1]) / TAU);
-        let radius = (1.0 - z * z).max(0.0).sqrt();
-        Vec3::new(radius * cosine, radius * sine, z)
+        let width = azimuths[1] - azimuths[0];
+        let solid_angle = (sines[1] - sines[0]) * width;
+        (solid_angle > 0.0).then_some(Patch { sines, width, edges, solid_angle, group: lamp.group })
     }
 
     fn holds(&self, d: Vec3) -> bool {
@@ -218,10 +192,9 @@ impl Patch {
             return false;
         }
         let after = |edge: [f32; 2]| edge[0] * d.y - edge[1] * d.x >= 0.0;
-        let width = self.azimuths[1] - self.azimuths[0];
         match () {
-            () if width > TAU - 1e-4 => true,
-            () if width <= PI => after(self.edges[0]) && !after(self.edges[1]),
+            () if self.width > TAU - 1e-4 => true,
+            () if self.width <= PI => after(self.edges[0]) && !after(self.edges[1]),
             () => after(self.edges[0]) || !after(self.edges[1]),
         }
     }
@@ -263,8 +236,6 @@ mod tests {
                 let d = Vec3::new(radius * cosine, radius * sine, z);
                 assert_eq!(sky.groups(d).count(), 1, "{rows} {columns} {d:?}");
                 assert_eq!(sky.groups(-d).count(), 0);
-                let drawn = sky.sample([s.uniform() as f32, s.uniform() as f32]).unwrap();
-                assert!((drawn.pdf * TAU - 1.0).abs() < 1e-5);
             }
             assert!((sky.white() - 1.0).abs() < 1e-5);
         }

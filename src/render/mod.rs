@@ -26,8 +26,8 @@ use trace::{Dice, Strategy, Tracer};
 use vector::Vec3;
 use world::World;
 
-/// Most samples per pixel: the length of the Sobol sequence.
-const MOST_SAMPLES: u32 = 1 << 16;
+/// Most samples per pixel: the Sobol sequence has 65536 points, and some draws use two per sample.
+const MOST_SAMPLES: u32 = 1 << 15;
 
 /// How a scene is rendered.
 #[derive(Debug, Clone, PartialEq)]
@@ -139,7 +139,7 @@ impl Film<'_> {
         let origin = Vec3::from(self.camera.position.map(|c| c as f32));
         let mut light = vec![0.0; self.groups];
         for index in 0..samples {
-            let dice = Dice { index, key };
+            let dice = Dice { index, samples, key };
             let [u, v, ..] = dice.roll(0);
             let direction = a.lerp(&b, u).lerp(&c.lerp(&d, u), v).normalize();
             self.tracer.trace(Ray { origin, direction, reach: f32::INFINITY }, &dice, &mut light);

@@ -1,12 +1,12 @@
 //! Paths of light from the camera back to the lamps.
 //!
-//! In: a [`World`] and a camera ray. Out: radiance per light group, all groups from the same path. At every surface each lamp
-//! is sampled once, and the sky once over all its patches; the path goes on by sampling the surface; the two are
-//! weighted by the power heuristic (Veach 1997). Never knows a pixel.
+//! In: a [`World`] and a camera ray. Out: radiance per light group, all groups from the same path. At every surface one ray
+//! goes to each lamp and one to the sky; the path goes on by sampling the surface; what both ways can find is weighted
+//! by the power heuristic (Veach 1997). Never knows a pixel.
 
 use super::Settings;
 use super::accel::Ray;
-use super::bsdf::Bsdf;
+use super::bsdf::{Bsdf, Scatter};
 use super::lamp::{LampHit, Towards};
 use super::vector::{Frame, Vec3};
 use super::world::{Encounter, Spot, World};
@@ -79,19 +79,30 @@ struct Walk {
 
 /// The random numbers of one path: sets of four, each well spread over the samples of the pixel.
 pub(super) struct Dice {
-    /// Which sample of the pixel.
+    /// Which sample of the pixel, of how many.
     pub index: u32,
+    pub samples: u32,
     /// Names the pixel.
     pub key: u32,
 }
 
 impl Dice {
+    /// Two rolls of one set for two draws of the same kind: over the samples each is well spread, and both together.
+    pub fn pair(&self, set: u32) -> [[f32; 4]; 2] {
+        let seed = self.seed(set);
+        [sample_4d(self.index, 0, seed), sample_4d(self.index + self.samples, 0, seed)]
+    }
+
     /// Set number `set`: Owen-scrambled Sobol points (Burley 2020), one scramble per pixel and set.
     pub fn roll(&self, set: u32) -> [f32; 4] {
+        sample_4d(self.index, 0, self.seed(set))
+    }
+
+    fn seed(&self, set: u32) -> u32 {
         let mut seed = self.key ^ set.wrapping_mul(0x9e37_79b9);
         seed = (seed ^ (seed >> 16)).wrapping_mul(0x85eb_ca6b);
         seed = (seed ^ (seed >> 13)).wrapping_mul(0xc2b2_ae35);
-        sample_4d(self.index, 0, seed ^ (seed >> 16))
+        seed ^ (seed >> 16)
     }
 }
 
@@ -146,9 +157,10 @@ impl<'a> Tracer<'a> {
             spot.bsdf = roughened(spot.bsdf, self.secondary_roughness);
         }
         let vertex = Vertex::new(spot, walk, depth);
-        let first_set = 1 + depth * self.sets_per_vertex();
-        let [u, v, lobe, roulette] = dice.roll(first_set);
-        self.gather(&vertex, roulette, |pair| dice.roll(first_set + 1 + pair), light);
+        let set = 1 + depth * self.sets_per_vertex();
+        let [[u, v, lobe, roulette], for_sky] = dice.pair(set);
+        self.gather_lamps(&vertex, roulette, |pair| dice.roll(set + 1 + pair), light);
+        self.gather_sky(&vertex, for_sky, light);
         let (local, scatter) = vertex.spot.bsdf.sample(vertex.wo, [u, v, lobe])?;
         let direction = vertex.frame.to_world(local);
         let throughput = walk.throughput * scatter.value / scatter.pdf;
@@ -157,40 +169,60 @@ impl<'a> Tracer<'a> {
         goes_on.then_some(Walk { ray, throughput, pdf: Some(scatter.pdf) })
     }
 
-    /// One set for the surface, and one for every two lamps; the sky counts as a lamp.
+    /// One set for the surface and the sky, and one for every two lamps.
     fn sets_per_vertex(&self) -> u32 {
-        1 + (self.whites.len() as u32).div_ceil(2)
+        1 + (self.world.lamps.len() as u32).div_ceil(2)
     }
 
-    /// Light that comes straight from each lamp and from the sky.
-    fn gather(&self, vertex: &Vertex, roulette: f32, roll: impl Fn(u32) -> [f32; 4], light: &mut [f32]) {
+    /// Light that comes straight from each lamp.
+    fn gather_lamps(&self, vertex: &Vertex, roulette: f32, roll: impl Fn(u32) -> [f32; 4], light: &mut [f32]) {
         let mut numbers = [0.0; 4];
-        for source in 0..self.whites.len() {
+        for (source, lamp) in self.world.lamps.iter().enumerate() {
             if source % 2 == 0 {
                 numbers = roll(source as u32 / 2);
             }
             let u = if source % 2 == 0 { [numbers[0], numbers[1]] } else { [numbers[2], numbers[3]] };
-            let drawn = match self.world.lamps.get(source) {
-                Some(lamp) => lamp.sample(vertex.origin, u),
-                None => self.world.sky.sample(u),
-            };
-            let Some(towards) = drawn else { continue };
-            let amount = self.survivor(self.straight(vertex, source, &towards), source, roulette);
-            if amount > 0.0 && !self.world.shadowed(vertex.origin, towards.direction, towards.distance) {
-                self.credit(source, towards.direction, amount, light);
+            let Some(towards) = lamp.sample(vertex.origin, u) else { continue };
+            let scatter = vertex.spot.bsdf.evaluate(vertex.wo, vertex.frame.to_local(towards.direction));
+            self.straight(vertex, source, &towards, scatter, roulette, light);
+        }
+    }
+
+    /// Light that comes straight from the sky: one direction for all its patches, drawn as the surface draws, because the
+    /// sky is wide and the surface choosy.
+    fn gather_sky(&self, vertex: &Vertex, [u, v, lobe, roulette]: [f32; 4], light: &mut [f32]) {
+        if self.world.sky.is_empty() {
+            return;
+        }
+        if let Some((local, scatter)) = vertex.spot.bsdf.sample(vertex.wo, [u, v, lobe]) {
+            let direction = vertex.frame.to_world(local);
+            if self.world.sky.covers(direction) {
+                let towards = Towards { direction, distance: f32::INFINITY, pdf: scatter.pdf };
+                self.straight(vertex, self.world.lamps.len(), &towards, scatter, roulette, light);
             }
         }
     }
 
-    /// What a direction drawn towards a source brings if nothing is in the way.
-    fn straight(&self, vertex: &Vertex, source: usize, towards: &Towards) -> f32 {
+    /// Adds what a direction drawn towards a source brings, unless something is in the way.
+    fn straight(
+        &self,
+        vertex: &Vertex,
+        source: usize,
+        towards: &Towards,
+        scatter: Scatter,
+        roulette: f32,
+        light: &mut [f32],
+    ) {
         if vertex.spot.geometric.dot(&towards.direction) <= 0.0 {
-            return 0.0;
+            return;
         }
-        let scatter = vertex.spot.bsdf.evaluate(vertex.wo, vertex.frame.to_local(towards.direction));
         let weight = self.strategy.of_lamp(towards.pdf, scatter.pdf);
         let amount = vertex.throughput * scatter.value / towards.pdf * weight;
-        if vertex.depth > 0 { amount.min(self.clamp * self.whites[source]) } else { amount }
+        let held = if vertex.depth > 0 { amount.min(self.clamp * self.whites[source]) } else { amount };
+        let amount = self.survivor(held, source, roulette);
+        if amount > 0.0 && !self.world.shadowed(vertex.origin, towards.direction, towards.distance) {
+            self.credit(source, towards.direction, amount, light);
+        }
     }
 
     /// The amount after the roulette: 0, or as it was, or raised to the least amount that is worth a ray.
@@ -215,8 +247,9 @@ impl<'a> Tracer<'a> {
 
     /// A path that leaves the scene after `depth` surfaces.
     fn reach_sky(&self, walk: &Walk, depth: u32, light: &mut [f32]) {
-        let (source, pdf) = (self.world.lamps.len(), self.world.sky.pdf(walk.ray.direction));
-        if pdf > 0.0 {
+        // The direction towards the sky is drawn with the surface's own density.
+        let (source, pdf) = (self.world.lamps.len(), walk.pdf.unwrap_or(0.0));
+        if self.world.sky.covers(walk.ray.direction) {
             self.credit(source, walk.ray.direction, self.arriving(walk, source, pdf, depth), light);
         }
     }
