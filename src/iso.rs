@@ -251,8 +251,12 @@ mod tests {
             near(F[step], 5.5 * mean.powf(0.41), "f");
             near(G[step], 2.5 * mean.powf(0.34), "g");
             near(K[step], 0.6 * mean.cbrt(), "k");
-            near(M[step], f64::from(GRADES[3][step] - GRADES[2][step]), "m");
-            near(N[step], 5.0 * mean.powf(0.34), "n");
+            // Up to 3 mm the standard sets m, n and p closer to zero than its formulas.
+            if step > 0 {
+                near(M[step], f64::from(GRADES[3][step] - GRADES[2][step]), "m");
+                near(N[step], 5.0 * mean.powf(0.34), "n");
+                near(P[step], f64::from(GRADES[3][step]) + 2.5, "p");
+            }
             low = high;
         }
     }

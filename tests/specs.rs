@@ -23,7 +23,7 @@ fn dim<'a>(design: &'a Design, name: &str) -> &'a gonogo::design::model::Dimensi
 
 #[test]
 fn every_spec_is_in_canonical_layout() {
-    for name in ["pattern_wheel"] {
+    for name in ["pattern_wheel", "four_screws", "pinned_plate"] {
         let text = read(&format!("specs/{name}.gng")).unwrap();
         assert_eq!(gonogo::syntax::format(&text).unwrap(), text, "{name}");
     }
@@ -108,4 +108,47 @@ fn the_steps_of_a_pin_share_their_lengths() {
     let collar = pin.features[1].copies[0].pose.eval(&values).translation.z;
     assert!((collar - 8.51).abs() < 1e-12);
     assert!(!matches!(pin.features[1].copies[0].pose.t[2], Expr::Const(_)));
+}
+
+#[test]
+fn screws_are_numbered_as_a_page_is_read() {
+    let design = design("four_screws");
+    let poses = gonogo::assembly::place::place(&design, &design.nominal());
+    let expected = [[-13.4, 15.25], [13.4, 15.25], [-13.4, -15.25], [13.4, -15.25]];
+    for (i, [x, y]) in expected.into_iter().enumerate() {
+        let t = poses[i + 1].translation.vector;
+        assert_eq!(design.components[i + 1].name, format!("screw[{}]", i + 1));
+        assert!((t.x - x).abs() + (t.y - y).abs() + t.z.abs() < 1e-9, "{t:?}");
+    }
+    let camera = &design.stations[0].camera;
+    let pixel = 150.0 * camera.pitch / camera.focal.nominal;
+    assert!((pixel - 0.086).abs() < 1e-4, "{pixel}");
+    assert!(design.components[1].free[5]);
+}
+
+#[test]
+fn pinned_plate_has_the_limits_of_the_standards() {
+    let design = design("pinned_plate");
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
+    let bore = dim(&design, "plate.bore[2].d");
+    assert!(close(bore.mmc, 6.0) && close(bore.lmc, 6.012));
+    let shank = dim(&design, "pin[3].shank.d");
+    assert!(close(shank.mmc, 5.996) && close(shank.lmc, 5.988));
+    let y = dim(&design, "plate.slab.y");
+    assert!(close(y.range.low, 49.7) && close(y.range.high, 50.3));
+    let key = dim(&design, "plate.key.x");
+    assert_eq!((key.sense, key.mmc, key.lmc), (Sense::Internal, 8.0, 8.05));
+    let relief = dim(&design, "plate.relief.d");
+    assert_eq!((relief.mmc, relief.range.nominal, relief.lmc), (15.8, 16.0, 16.3));
+}
+
+#[test]
+fn a_setting_overrides_a_let_and_the_digest_knows_it() {
+    let path = "specs/pinned_plate.gng";
+    let set = [("pin_size".to_string(), "8".to_string())];
+    let larger = load(path, &read, &set);
+    assert!(larger.diagnostics.is_empty(), "{:#?}", larger.diagnostics);
+    assert!((dim(larger.design.as_ref().unwrap(), "plate.bore[1].d").mmc - 8.0).abs() < 1e-12);
+    assert_ne!(larger.text, loaded(path).text);
+    assert_eq!(larger.inputs, [path]);
 }

@@ -8,14 +8,17 @@ use std::io::IsTerminal;
 
 /// Prints diagnostics in the format asked for.
 pub fn print(diagnostics: &[Diagnostic], sources: &Sources, global: &Global) -> Result<(), Failure> {
-    for diagnostic in diagnostics {
-        match global.message_format {
-            MessageFormat::Human => output::remark(&report::human(diagnostic, sources, has_colour(global))),
-            MessageFormat::Short => output::remark(&report::short(diagnostic, sources)),
-            MessageFormat::Json => output::line(&report::json(diagnostic, sources))?,
-            MessageFormat::Github => output::line(&github(diagnostic, sources))?,
-            MessageFormat::Sarif => return Err(Failure("`--message-format sarif` is not available yet".into())),
+    if diagnostics.is_empty() {
+        return Ok(());
+    }
+    match global.message_format {
+        MessageFormat::Human => output::remark(report::human(sources, diagnostics, has_colour(global)).trim_end()),
+        MessageFormat::Short => output::remark(report::short(sources, diagnostics, false).trim_end()),
+        MessageFormat::Json => output::line(report::json(sources, diagnostics, false).trim_end())?,
+        MessageFormat::Github => {
+            diagnostics.iter().try_for_each(|diagnostic| output::line(&github(diagnostic, sources)))?;
         }
+        MessageFormat::Sarif => return Err(Failure("`--message-format sarif` is not available yet".into())),
     }
     Ok(())
 }

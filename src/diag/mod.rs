@@ -2,7 +2,10 @@
 //!
 //! A stage returns what it could make and a list of these. Nothing here prints; `cli` renders them.
 
+mod explain;
 pub mod suggest;
+
+pub use explain::{codes, explain};
 
 use serde::Serialize;
 

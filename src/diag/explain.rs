@@ -1,0 +1,57 @@
+//! The pages behind `gonogo explain CODE`: what a code means, and how the fault looks and is mended.
+
+/// Pages by code, in the order of the codes.
+const PAGES: &[(&str, &str)] = &[
+    ("E0101", include_str!("explain/E0101.md")),
+    ("E0102", include_str!("explain/E0102.md")),
+    ("E0103", include_str!("explain/E0103.md")),
+    ("E0104", include_str!("explain/E0104.md")),
+    ("E0105", include_str!("explain/E0105.md")),
+    ("E0201", include_str!("explain/E0201.md")),
+    ("E0202", include_str!("explain/E0202.md")),
+    ("E0203", include_str!("explain/E0203.md")),
+    ("E0204", include_str!("explain/E0204.md")),
+    ("E0205", include_str!("explain/E0205.md")),
+    ("E0206", include_str!("explain/E0206.md")),
+    ("E0207", include_str!("explain/E0207.md")),
+    ("E0208", include_str!("explain/E0208.md")),
+    ("W0209", include_str!("explain/W0209.md")),
+    ("E0210", include_str!("explain/E0210.md")),
+    ("E0211", include_str!("explain/E0211.md")),
+    ("E0212", include_str!("explain/E0212.md")),
+    ("E0301", include_str!("explain/E0301.md")),
+    ("E0302", include_str!("explain/E0302.md")),
+    ("E0303", include_str!("explain/E0303.md")),
+    ("W0304", include_str!("explain/W0304.md")),
+    ("E0305", include_str!("explain/E0305.md")),
+    ("E0306", include_str!("explain/E0306.md")),
+    ("E0307", include_str!("explain/E0307.md")),
+    ("E0309", include_str!("explain/E0309.md")),
+    ("W0310", include_str!("explain/W0310.md")),
+    ("E0504", include_str!("explain/E0504.md")),
+    ("E0505", include_str!("explain/E0505.md")),
+];
+
+/// The page of a code such as `E0305`; `None` for a code that does not exist.
+pub fn explain(code: &str) -> Option<&'static str> {
+    PAGES.iter().find(|(known, _)| known.eq_ignore_ascii_case(code)).map(|(_, page)| *page)
+}
+
+/// Every code that has a page.
+pub fn codes() -> impl Iterator<Item = &'static str> {
+    PAGES.iter().map(|(code, _)| *code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_page_begins_with_its_code() {
+        for code in codes() {
+            assert!(explain(code).is_some_and(|page| page.starts_with(&format!("# {code}: "))), "{code}");
+        }
+        assert_eq!(explain("e0305"), explain("E0305"));
+        assert_eq!(explain("E9999"), None);
+    }
+}
