@@ -73,6 +73,9 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
 
 /// Prints the page of a diagnostic.
 fn explain(args: &Explain) -> Result<Exit, Failure> {
-    let code = args.code.to_ascii_uppercase();
-    Err(Failure(format!("there is no page for `{code}` yet")))
+    let Some(page) = crate::diag::explain(&args.code) else {
+        return Err(Failure(format!("there is no diagnostic `{}`", args.code)));
+    };
+    output::line(page.trim_end())?;
+    Ok(Exit::Fine)
 }
