@@ -172,18 +172,28 @@ fn rounded_down(value: f64) -> String {
     format!("{:.decimals$}", (value * scale + 1e-9).floor() / scale)
 }
 
-/// E0503 for every component but the root that has no contact.
+/// What is nearer than this (mm, the facets of curved faces) touches after all, if only along a line or in a point.
+const LINE_CONTACT: f64 = 0.02;
+
+/// E0503 for every component but the root that touches nothing.
 fn untouched(design: &Design, solids: &[Arc<Solid>], liaison: &Liaison) -> Vec<Diagnostic> {
     let poses = place(design, &design.nominal());
     let lonely = (1..liaison.components).filter(|c| liaison.of(*c).next().is_none());
-    lonely.map(|c| touches_nothing(design, solids, &poses, c)).collect()
+    let nearest = lonely.map(|c| (c, nearest_face(solids, &poses, c)));
+    let apart = nearest.filter(|(_, nearest)| nearest.is_none_or(|(_, distance)| distance > LINE_CONTACT));
+    apart.map(|(c, nearest)| touches_nothing(design, solids, c, nearest)).collect()
 }
 
-fn touches_nothing(design: &Design, solids: &[Arc<Solid>], poses: &[Isometry3<f64>], component: usize) -> Diagnostic {
+fn touches_nothing(
+    design: &Design,
+    solids: &[Arc<Solid>],
+    component: usize,
+    nearest: Option<(FaceRef, f64)>,
+) -> Diagnostic {
     let this = &design.components[component];
     let message = format!("`{}` touches nothing", this.name);
     let found = Diagnostic::error("E0503", this.span, message).note("without a contact it has no error tree");
-    match nearest_face(solids, poses, component) {
+    match nearest {
         Some((face, distance)) => {
             let name = face_name(design, solids, face);
             found.label(format!("nearest is `{name}`, {distance:.2} mm away")).help("check where it is placed")
@@ -278,6 +288,16 @@ mod tests {
         let found = findings(&pinned(6.0, [0.0; 2], 0.0, 5.31));
         assert_eq!((found[0].0, found[0].1.as_str()), ("E0503", "`pin` touches nothing"));
         assert!(found[0].2.contains("0.31 mm away"), "{}", found[0].2);
+    }
+
+    #[test]
+    fn a_part_on_its_edge_is_not_in_the_air() {
+        let mut shop = sample::Shop::default();
+        let plate = shop.plate("plate", [2.0, 0.0], [20.0, 0.0], &[]);
+        let cone = shop.pin("cone", &[("point", 1e-3, 6.0, [0.0; 2], 4.0)]);
+        shop.place("plate", plate, [0.0; 3], 0.0, 0.0);
+        shop.place("cone", cone, [0.0, 0.0, 2.0], 0.0, 0.0);
+        assert_eq!(findings(&shop.finish()), []);
     }
 
     #[test]
