@@ -4,9 +4,9 @@
 //! tolerance), E0503 (a component that touches nothing). Never moves anything.
 
 use super::contact::{Clash, Contact, FaceRef, Fit};
-use super::insertion::Entering;
 use super::liaison::Liaison;
 use super::limits::{Slip, Zones};
+use super::meeting::Entering;
 use super::place::place;
 use crate::design::model::Design;
 use crate::diag::Diagnostic;

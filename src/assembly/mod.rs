@@ -14,6 +14,7 @@ pub mod turn;
 mod check;
 mod columns;
 mod limits;
+mod meeting;
 mod overlap;
 mod rest;
 #[cfg(test)]
