@@ -37,6 +37,7 @@ pub(super) fn build(tree: &Tree, mut arrangement: Arrangement, quality: &Quality
     drafts.iter_mut().for_each(|d| d.owner = owner(tree, &arrangement, d));
     drafts.sort_by_key(|d| (d.owner, d.sheet, d.loops.first().and_then(|l| l.first().copied())));
     link(&mut edges, &drafts);
+    check_corners(tree, &drafts, &edges, &vertices)?;
     let fluxes = fluxes(tree, &arrangement, &drafts);
     let shells = check_shells(tree, &drafts, &edges, &fluxes, &vertices)?;
     let faces = drafts.iter().zip(&fluxes).map(|(d, f)| d.face(tree, f.area)).collect();
@@ -300,6 +301,32 @@ fn link(edges: &mut [Edge], drafts: &[Draft]) {
             edges[edge].faces[usize::from(!forward)] = face;
         }
     }
+}
+
+/// Round every corner, faces and edges must follow each other in one ring.
+fn check_corners(tree: &Tree, drafts: &[Draft], edges: &[Edge], vertices: &[Point3<f64>]) -> Result<(), Faults> {
+    // The ends of edges: twice the edge, one more for its far end.
+    let mut parent: Vec<usize> = (0..2 * edges.len()).collect();
+    for path in drafts.iter().flat_map(|d| &d.loops) {
+        for (i, &(edge, forward)) in path.iter().enumerate() {
+            let (next, next_forward) = path[(i + 1) % path.len()];
+            let (a, b) = (2 * edge + usize::from(forward), 2 * next + usize::from(!next_forward));
+            let (a, b) = (root(&parent, a), root(&parent, b));
+            parent[a.max(b)] = a.min(b);
+        }
+    }
+    let mut ring_at: Vec<Option<usize>> = vec![None; vertices.len()];
+    for end in 0..2 * edges.len() {
+        let Some(corner) = edges[end / 2].ends[end % 2] else { continue };
+        let ring = root(&parent, end);
+        if *ring_at[corner].get_or_insert(ring) != ring {
+            let p = vertices[corner];
+            let message = format!("`{}` touches itself in a point only", tree.part.name);
+            let fault = Diagnostic::error("E0407", tree.part.span, message);
+            return Err(vec![fault.note(format!("at ({:.3}, {:.3}, {:.3}) mm", p.x, p.y, p.z))]);
+        }
+    }
+    Ok(())
 }
 
 fn fluxes(tree: &Tree, arrangement: &Arrangement, drafts: &[Draft]) -> Vec<Flux> {

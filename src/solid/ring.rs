@@ -91,10 +91,16 @@ impl Ring {
         self.winding == 0 && self.area() > 0.0
     }
 
-    /// The node with the least v.
+    /// A point beside the node with the least v, on a segment with the face right below it. Not the node itself: nodes of
+    /// different rings share their u, and which of two neighbours a ray through a node meets is a matter of rounding.
     pub fn lowest(&self) -> [f64; 2] {
-        let low = self.nodes.iter().min_by(|a, b| a.uv[1].total_cmp(&b.uv[1]));
-        low.map_or([0.0, 0.0], |n| n.uv)
+        let segments: Vec<_> = self.segments().collect();
+        let low = (0..segments.len()).min_by(|i, j| segments[*i].0[1].total_cmp(&segments[*j].0[1])).unwrap_or(0);
+        let Some((from, to)) = segments.get(low) else { return [0.0, 0.0] };
+        let (before, at) = segments[(low + segments.len() - 1) % segments.len()];
+        // With the face on the left, it lies below a segment that runs towards smaller u.
+        let (start, end) = if to[0] < from[0] { (*from, *to) } else { (at, before) };
+        [0, 1].map(|k| start[k] + (end[k] - start[k]) * BESIDE)
     }
 
     /// Greatest v below `p` at which the ring crosses p's u.
@@ -113,6 +119,9 @@ impl Ring {
         self.nodes.iter().map(|n| Node { uv: [n.uv[0] + by, n.uv[1]], id: n.id }).collect()
     }
 }
+
+/// How far from the lowest node a ray starts, as a share of the segment.
+const BESIDE: f64 = 0.0137;
 
 /// `u` moved by whole periods to within half a period of `to`.
 fn nearest(u: f64, to: f64, period: f64) -> f64 {

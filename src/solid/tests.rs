@@ -1,5 +1,8 @@
 //! Solids against closed forms and the reference figures of an independent modeller.
 
+mod random;
+mod wheel;
+
 use super::*;
 use crate::design::model::{Expr, Extent, Feature, FeatureCopy, Op, PoseExpr, Shape};
 use crate::diag::Span;
