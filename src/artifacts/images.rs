@@ -1,81 +1,91 @@
-//! Pictures of the nominal assembly for people: what the camera sees, which component is where, and every error mode.
+//! Synthetic photos of the nominal assembly, correct and with every error mode, and a map of its components.
 //!
-//! In: a design, its station, the camera, the error modes. Out: PNG files by name. Never read back by any stage.
+//! In: a design, its station, the camera, the error modes. Out: PNG files by name. The photos have the size and the tone of
+//! the station's own, with its noise, so they can be judged as those are. Never read back by any stage.
 
 use crate::assembly::fault::ErrorMode;
 use crate::design::model::{Design, Station};
+use crate::render::sensor::{self, Sensor};
+use crate::render::{self, LightImages, Settings};
 use crate::runtime::camera::Camera;
-use crate::runtime::grid::Grid;
 use crate::scene::build;
-use crate::train::shots::{self, Drawn, Setup, Shot};
+use crate::train::shots::{self, Drawn};
 use crate::view::item_buffer::ItemBuffer;
 use crate::view::picture::false_colour;
-use image::{GrayImage, ImageFormat, Luma, RgbImage};
+use image::{GrayImage, ImageFormat, RgbImage};
 use std::io::Cursor;
 
 /// Faults are shown in the middle of their range.
 const MIDDLE: [f64; 3] = [0.5; 3];
-/// Pictures of faults have this many times fewer pixels each way.
-const FAULT_REDUCTION: u32 = 2;
-/// The brightest pixels but this share of all stay below full scale.
-const HIGHLIGHTS: f64 = 0.02;
+/// This share of the pixels is brighter than [`EXPOSED_TO`] of full scale: a well exposed photo.
+const HIGHLIGHTS: f64 = 0.05;
+const EXPOSED_TO: f32 = 0.6;
 
-/// `images/good.png`, `images/components.png`, and `images/<component> <fault>.png` for every error mode.
+/// `images/good.png`, `images/components.png`, and `images/NN <component> <fault>.png` for every error mode.
 pub fn pictures(design: &Design, station: &Station, camera: &Camera, modes: &[ErrorMode]) -> Vec<(String, Vec<u8>)> {
     let Ok(drawn) = shots::nominal(design, station) else { return Vec::new() };
-    let take = |camera: Camera, reduction: u32, faults: &[(&ErrorMode, [f64; 3])]| {
-        let setup = Setup {
-            station,
-            lamps: build::lamps(station, &camera),
-            camera: camera.reduced(reduction),
-            samples: design.train.samples,
-            blur: station.camera.blur.nominal / f64::from(reduction),
-        };
-        lit(station, &shots::take(&setup, &drawn, &drawn.instance(faults), design.train.seed))
-    };
-    let good = take(*camera, 1, &[]);
-    let white = exposure(&good);
+    let studio = Studio { design, station, camera, drawn };
+    let good = studio.take(&[], 0);
+    let weights = studio.weights(&good);
     let mut files = vec![
-        ("images/good.png".into(), png_grey(&good, white)),
-        ("images/components.png".into(), png(&false_colour(&items(&drawn, camera)))),
+        ("images/good.png".into(), grey(&studio.expose(&good, &weights, 0))),
+        ("images/components.png".into(), colour(&false_colour(&studio.items()))),
     ];
-    for (number, mode) in modes.iter().enumerate() {
+    for (mode, number) in modes.iter().zip(1..) {
         let name = &design.components[mode.component].name;
-        let file = format!("images/{:02} {name} {}.png", number + 1, mode.kind.word());
-        files.push((file, png_grey(&take(*camera, FAULT_REDUCTION, &[(mode, MIDDLE)]), white)));
+        let file = format!("images/{number:02} {name} {}.png", mode.kind.word());
+        let shot = studio.take(&[(mode, MIDDLE)], number);
+        files.push((file, grey(&studio.expose(&shot, &weights, number))));
     }
     files
 }
 
-fn items(drawn: &Drawn, camera: &Camera) -> ItemBuffer {
-    ItemBuffer::of(&build::bodies(&drawn.instance(&[]), drawn.standing.to_array()), camera)
+struct Studio<'a> {
+    design: &'a Design,
+    station: &'a Station,
+    camera: &'a Camera,
+    drawn: Drawn,
 }
 
-/// Under the lamps as the spec describes them.
-fn lit(station: &Station, shot: &Shot) -> Grid {
-    let lights = build::light_of_group(station);
-    let powers: Vec<f64> = lights.iter().map(|&l| station.lights[l].power).collect();
-    shot.lit(&powers)
+impl Studio<'_> {
+    fn take(&self, faults: &[(&ErrorMode, [f64; 3])], number: u64) -> LightImages {
+        let lamps = build::lamps(self.station, self.camera);
+        let instance = self.drawn.instance(faults);
+        let ground = self.drawn.ground.clone();
+        let scene = build::scene(self.station, &instance, self.drawn.standing.to_array(), lamps, ground);
+        let seed = self.design.train.seed ^ number;
+        render::render(&scene, self.camera, &Settings { samples: self.design.train.samples, seed, ..Settings::default() })
+    }
+
+    /// The lamps as the spec describes them, exposed for the good assembly.
+    fn weights(&self, good: &LightImages) -> Vec<f64> {
+        let lights = build::light_of_group(self.station);
+        let powers: Vec<f64> = lights.iter().map(|&l| self.station.lights[l].power).collect();
+        let mut light = sensor::combine(good, &powers);
+        light.sort_by(f32::total_cmp);
+        let bright = light.get((light.len() as f64 * (1.0 - HIGHLIGHTS)) as usize).copied().unwrap_or(0.0);
+        let gain = if bright > 0.0 { f64::from(EXPOSED_TO / bright) } else { 1.0 };
+        powers.iter().map(|p| p * gain).collect()
+    }
+
+    fn expose(&self, shot: &LightImages, weights: &[f64], number: u64) -> GrayImage {
+        let camera = &self.station.camera;
+        let (blur, read_noise, response) = (camera.blur.nominal, self.station.noise, camera.response);
+        let sensor = Sensor { blur, read_noise, response, ..Sensor::ideal() };
+        sensor.expose(shot, weights, self.design.train.seed ^ number)
+    }
+
+    fn items(&self) -> ItemBuffer {
+        let bodies = build::bodies(&self.drawn.instance(&[]), self.drawn.standing.to_array());
+        ItemBuffer::of(&bodies, self.camera)
+    }
 }
 
-/// The value that becomes white.
-fn exposure(grid: &Grid) -> f32 {
-    let mut values = grid.values.clone();
-    values.sort_by(f32::total_cmp);
-    let at = ((values.len() as f64) * (1.0 - HIGHLIGHTS)) as usize;
-    values.get(at).copied().filter(|v| *v > 0.0).unwrap_or(1.0)
+fn grey(photo: &GrayImage) -> Vec<u8> {
+    encoded(|out| photo.write_to(out, ImageFormat::Png))
 }
 
-fn png_grey(grid: &Grid, white: f32) -> Vec<u8> {
-    let grey = GrayImage::from_fn(grid.width as u32, grid.height as u32, |x, y| {
-        let value = grid.at(x as usize, y as usize) / white;
-        // The eye's curve; 2.2 is close enough for pictures nobody measures in.
-        Luma([(value.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0).round() as u8])
-    });
-    encoded(|out| grey.write_to(out, ImageFormat::Png))
-}
-
-fn png(picture: &RgbImage) -> Vec<u8> {
+fn colour(picture: &RgbImage) -> Vec<u8> {
     encoded(|out| picture.write_to(out, ImageFormat::Png))
 }
 
