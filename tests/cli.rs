@@ -131,7 +131,10 @@ fn reversed_tolerances_are_refused() {
 #[test]
 fn one_run_reports_several_faults() {
     let folder = Folder::new("several");
-    folder.file("bad.gng", spec().replacen("material = white", "material = whote", 1).replacen("+0.012/0", "0/+0.012", 1));
+    folder.file(
+        "bad.gng",
+        spec().replacen("material = white", "material = whote", 1).replacen("+0.012/0", "0/+0.012", 1),
+    );
     folder.run(&["check", "bad.gng"]).expect(1, &["E0201", "E0301"]);
 }
 

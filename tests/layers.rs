@@ -186,8 +186,9 @@ fn names(code: &str, word: &str) -> bool {
 
 #[test]
 fn the_reader_of_uses_reads_them_all() {
-    assert_eq!(rooms_used("use crate::view::x; use crate::{Stage, solid::y, rng}; crate::diag::z()"), [
-        "view", "solid", "rng", "diag"
-    ]);
+    assert_eq!(
+        rooms_used("use crate::view::x; use crate::{Stage, solid::y, rng}; crate::diag::z()"),
+        ["view", "solid", "rng", "diag"]
+    );
     assert!(names("use pest::Parser", "pest::") && !names("tempest::x", "pest::"));
 }

@@ -54,7 +54,11 @@ impl Studio<'_> {
         let ground = self.drawn.ground.clone();
         let scene = build::scene(self.station, &instance, self.drawn.standing.to_array(), lamps, ground);
         let seed = self.design.train.seed ^ number;
-        render::render(&scene, self.camera, &Settings { samples: self.design.train.samples, seed, ..Settings::default() })
+        render::render(
+            &scene,
+            self.camera,
+            &Settings { samples: self.design.train.samples, seed, ..Settings::default() },
+        )
     }
 
     /// The lamps as the spec describes them, exposed for the good assembly.

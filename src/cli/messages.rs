@@ -6,21 +6,31 @@ use super::report;
 use crate::diag::{Diagnostic, Sources};
 use std::io::IsTerminal;
 
+/// Says at once what cannot be had, before any work is done.
+pub fn refuse_unavailable(global: &Global) -> Result<(), Failure> {
+    match global.message_format {
+        MessageFormat::Sarif => Err(Failure("`--message-format sarif` is not available yet".into())),
+        _ => Ok(()),
+    }
+}
+
 /// Prints diagnostics in the format asked for.
 pub fn print(diagnostics: &[Diagnostic], sources: &Sources, global: &Global) -> Result<(), Failure> {
-    if diagnostics.is_empty() {
-        return Ok(());
-    }
-    match global.message_format {
-        MessageFormat::Human => output::remark(report::human(sources, diagnostics, has_colour(global)).trim_end()),
-        MessageFormat::Short => output::remark(report::short(sources, diagnostics, false).trim_end()),
-        MessageFormat::Json => output::line(report::json(sources, diagnostics, false).trim_end())?,
-        MessageFormat::Github => {
-            diagnostics.iter().try_for_each(|diagnostic| output::line(&github(diagnostic, sources)))?;
+    let text = match global.message_format {
+        MessageFormat::Human => report::human(sources, diagnostics, has_colour(global)),
+        MessageFormat::Short => report::short(sources, diagnostics, has_colour(global)),
+        MessageFormat::Json => report::json(sources, diagnostics, false),
+        MessageFormat::Github => diagnostics.iter().map(|d| github(d, sources) + "\n").collect(),
+        MessageFormat::Sarif => return refuse_unavailable(global),
+    };
+    match (text.trim_end(), global.message_format) {
+        ("", _) => Ok(()),
+        (text, MessageFormat::Human | MessageFormat::Short) => {
+            output::remark(text);
+            Ok(())
         }
-        MessageFormat::Sarif => return Err(Failure("`--message-format sarif` is not available yet".into())),
+        (text, _) => output::line(text),
     }
-    Ok(())
 }
 
 /// Whether standard error takes colour.

@@ -13,11 +13,11 @@ mod messages;
 mod output;
 mod overlay;
 mod progress;
-pub mod report;
+mod report;
 mod verdict;
 
-use args::{Cli, Command, Explain, Golden, MessageFormat};
-use clap::{ColorChoice, CommandFactory, FromArgMatches};
+use args::{Cli, Command, Explain, Golden};
+use clap::Parser;
 use output::Failure;
 use std::process::ExitCode;
 
@@ -32,7 +32,7 @@ pub enum Exit {
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    let exit = match parse() {
+    let exit = match Cli::try_parse() {
         Ok(cli) => run(&cli).unwrap_or_else(|Failure(why)| {
             output::remark(&judge::coded(&why));
             Exit::Trouble
@@ -46,18 +46,9 @@ pub fn main() -> ExitCode {
     ExitCode::from(exit as u8)
 }
 
-fn parse() -> Result<Cli, clap::Error> {
-    // The colour of help and usage errors has to be known before parsing.
-    let asked = std::env::args().collect::<Vec<_>>().windows(2).any(|w| w[0] == "--color" && w[1] == "never");
-    let colour = if asked { ColorChoice::Never } else { ColorChoice::Auto };
-    Cli::from_arg_matches(&Cli::command().color(colour).try_get_matches()?)
-}
-
 fn run(cli: &Cli) -> Result<Exit, Failure> {
     let global = &cli.global;
-    if global.message_format == MessageFormat::Sarif {
-        return Err(Failure("`--message-format sarif` is not available yet".into()));
-    }
+    messages::refuse_unavailable(global)?;
     match &cli.command {
         Command::Compile(args) => compile::compile(args, global),
         Command::Check(args) => compile::check(args, global),
