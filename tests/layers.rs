@@ -44,7 +44,7 @@ const DOORS: &[(&str, &[&str])] = &[
 
 /// What only the command line does.
 const CLI_ONLY: &[&str] =
-    &["println!", "eprintln!", "print!(", "eprint!(", "dbg!(", "std::fs", "std::env", "std::time", "Instant::now"];
+    &["println!", "eprintln!", "print!(", "eprint!(", "dbg!(", "std::fs", "std::env", "Instant", "SystemTime"];
 
 struct Source {
     /// `view/choose.rs`

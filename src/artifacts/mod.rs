@@ -362,7 +362,6 @@ pub fn view(design: &Design, station: &Station, choice: &Choice) -> String {
 struct ModelSummary<'a> {
     writer: &'a str,
     assembly: &'a str,
-    spec: &'a str,
     seed: u64,
     station: &'a crate::runtime::model::Station,
     promise: &'a crate::runtime::model::Promise,
@@ -393,7 +392,6 @@ pub fn model_summary(model: &Model) -> String {
     let summary = ModelSummary {
         writer: &model.writer,
         assembly: &model.assembly,
-        spec: &model.spec,
         seed: model.seed,
         station: &model.station,
         promise: &model.promise,
