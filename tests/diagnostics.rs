@@ -36,7 +36,12 @@ fn reports_are_as_written_down() {
             let report = report(&case.spec);
             if report != case.report {
                 blessed = blessed.replacen(&page_of(&case.spec, &case.report), &page_of(&case.spec, &report), 1);
-                wrong.push(format!("{}:\n{}\n--- expected\n{}\n--- found\n{report}", path.display(), case.spec, case.report));
+                wrong.push(format!(
+                    "{}:\n{}\n--- expected\n{}\n--- found\n{report}",
+                    path.display(),
+                    case.spec,
+                    case.report
+                ));
             }
         }
         if bless && blessed != text {
@@ -48,7 +53,8 @@ fn reports_are_as_written_down() {
 
 #[test]
 fn every_code_has_a_page_and_a_test() {
-    let tested: String = pages().iter().flat_map(|p| cases(&fs::read_to_string(p).unwrap())).map(|c| c.report).collect();
+    let tested: String =
+        pages().iter().flat_map(|p| cases(&fs::read_to_string(p).unwrap())).map(|c| c.report).collect();
     let tested: BTreeSet<&str> = tested.match_indices('[').filter_map(|(i, _)| tested.get(i + 1..i + 6)).collect();
     for code in gonogo::diag::codes().filter(|code| ("E0".."E06").contains(&&code[..3]) || code.starts_with('W')) {
         assert!(tested.contains(code) || belongs_to_a_later_stage(code), "{code} has no test");

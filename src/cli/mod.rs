@@ -13,7 +13,7 @@ mod messages;
 mod output;
 mod overlay;
 mod progress;
-mod report;
+pub mod report;
 mod verdict;
 
 use args::{Cli, Command, Explain, Golden};
@@ -64,7 +64,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
 
 /// Prints the page of a diagnostic.
 fn explain(args: &Explain) -> Result<Exit, Failure> {
-    let Some(page) = crate::diag::explain(&args.code) else {
+    let Some(page) = crate::diag::explain(&args.code.to_ascii_uppercase()) else {
         return Err(Failure(format!("there is no diagnostic `{}`", args.code)));
     };
     output::line(page.trim_end())?;
