@@ -28,6 +28,12 @@ const PAGES: &[(&str, &str)] = &[
     ("E0307", include_str!("explain/E0307.md")),
     ("E0309", include_str!("explain/E0309.md")),
     ("W0310", include_str!("explain/W0310.md")),
+    ("E0401", include_str!("explain/E0401.md")),
+    ("E0405", include_str!("explain/E0405.md")),
+    ("E0406", include_str!("explain/E0406.md")),
+    ("E0407", include_str!("explain/E0407.md")),
+    ("E0408", include_str!("explain/E0408.md")),
+    ("E0410", include_str!("explain/E0410.md")),
     ("E0504", include_str!("explain/E0504.md")),
     ("E0505", include_str!("explain/E0505.md")),
 ];
