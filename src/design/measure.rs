@@ -144,14 +144,14 @@ impl Resolver {
         let limited = |range| Some(Limited { range, quantity, remark: Remark::default() });
         match tolerance {
             Tolerance::PlusMinus(q) => {
-                let inherited = self.size_scale(dim, quantity, want);
+                let inherited = self.size_scale(dim, quantity);
                 let deviation = self.deviation(q, nominal, quantity, want, inherited)?.abs();
                 limited(Range::symmetric(nominal, deviation))
             }
             Tolerance::Deviations { upper, lower, unit } => {
                 let [high, low] = [upper, lower].map(|number| {
                     let q = ast::Quantity { number: number.clone(), unit: unit.clone(), span: dim.span };
-                    let inherited = self.size_scale(dim, quantity, want);
+                    let inherited = self.size_scale(dim, quantity);
                     self.deviation(&q, nominal, quantity, want, inherited)
                 });
                 let (high, low) = (high?, low?);
@@ -162,14 +162,18 @@ impl Resolver {
                 limited(Range { low: nominal + low, nominal, high: nominal + high })
             }
             Tolerance::Limits(q) => {
-                let other = self.quantity(q)?;
+                let own = match &dim.size {
+                    Size::Quantity(size) => q.unit.clone().or_else(|| size.unit.clone()),
+                    _ => q.unit.clone(),
+                };
+                let other = self.quantity(&ast::Quantity { unit: own, ..q.clone() })?;
                 let high = self.same_scale(other, quantity, q.span, want)?;
                 if high < nominal {
                     let message = format!("the upper limit {} is below the lower limit", q.number.text);
                     self.report(
                         Diagnostic::error("E0301", dim.span, message)
                             .label("limits reversed")
-                            .help("write the smaller limit first"),
+                            .help(format!("write the smaller limit first: `{} .. …`", q.number.text)),
                     );
                     return None;
                 }
@@ -247,7 +251,11 @@ impl Resolver {
         let (low, high) = (mmc.min(lmc), mmc.max(lmc));
         if !(low..=high).contains(&nominal) {
             let message = format!("the nominal size {nominal} lies outside {low} .. {high}");
-            self.report(Diagnostic::error("E0306", span, message).label("nominal outside its limits"));
+            self.report(
+                Diagnostic::error("E0306", span, message)
+                    .label("nominal outside its limits")
+                    .help(format!("write `{{ mmc {mmc}, nominal {}, lmc {lmc} }}`", trim((mmc + lmc) / 2.0))),
+            );
             return None;
         }
         let remark = Remark { states: Some([mmc, lmc]), fit: None };
@@ -286,17 +294,14 @@ impl Resolver {
         }
     }
 
-    /// What a bare deviation is multiplied by to be in the terms of the size: the size's own unit.
-    fn size_scale(&self, dim: &ast::Dim, quantity: Option<Quantity>, want: Option<Quantity>) -> f64 {
+    /// What a bare deviation is multiplied by to be in the terms of the size: the size's own unit, or its file's.
+    fn size_scale(&self, dim: &ast::Dim, quantity: Option<Quantity>) -> f64 {
         match (&dim.size, quantity) {
             (Size::Quantity(q), Some(_)) => {
                 q.unit.as_ref().and_then(|u| unit(&u.text)).map_or(1.0, |(_, factor)| factor)
             }
             (_, Some(q)) => self.file_scale(q, dim.span),
-            (_, None) => {
-                let _ = want;
-                1.0
-            }
+            (_, None) => 1.0,
         }
     }
 
@@ -379,7 +384,7 @@ impl Resolver {
             Sum::Group(inner) => self.sum(inner, usage),
             Sum::Negative(inner) => {
                 let value = self.sum(inner, usage)?;
-                Some(Typed { expr: Expr::Neg(Box::new(value.expr)), quantity: value.quantity })
+                Some(Typed { expr: folded(Expr::Neg(Box::new(value.expr))), quantity: value.quantity })
             }
             Sum::Binary(sign, a, b) => {
                 let (a, b) = (self.sum(a, usage), self.sum(b, usage));
@@ -418,9 +423,7 @@ impl Resolver {
             '*' => Expr::Mul(a, b),
             _ => Expr::Div(a, b),
         };
-        let constant = matches!((&expr, ()), (Expr::Add(a, b) | Expr::Sub(a, b) | Expr::Mul(a, b) | Expr::Div(a, b), ())
-            if matches!((&**a, &**b), (Expr::Const(_), Expr::Const(_))));
-        Some(Typed { expr: if constant { Expr::Const(expr.eval(&[])) } else { expr }, quantity })
+        Some(Typed { expr: folded(expr), quantity })
     }
 
     fn coerce(&mut self, typed: Typed, want: Quantity, span: Span) -> Option<Expr> {
@@ -521,6 +524,18 @@ impl Resolver {
 /// A number without the noise of its last bits.
 pub fn trim(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
+}
+
+/// An operation on two constants as a constant: nominal values hold nothing else.
+fn folded(expr: Expr) -> Expr {
+    let constants = match &expr {
+        Expr::Neg(a) => matches!(**a, Expr::Const(_)),
+        Expr::Add(a, b) | Expr::Sub(a, b) | Expr::Mul(a, b) | Expr::Div(a, b) => {
+            matches!((&**a, &**b), (Expr::Const(_), Expr::Const(_)))
+        }
+        Expr::Const(_) | Expr::Dim(_) => false,
+    };
+    if constants { Expr::Const(expr.eval(&[])) } else { expr }
 }
 
 fn scaled(expr: Expr, scale: f64) -> Expr {

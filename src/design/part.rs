@@ -154,10 +154,10 @@ impl Resolver {
         };
         self.report(match nearest(name, materials.keys().copied()) {
             Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
-            None => diagnostic.help(format!(
-                "define it: `material {} {{ kind = matt }}`",
-                if known_as.is_some() { "steel" } else { name }
-            )),
+            None if known_as.is_some() => {
+                diagnostic.help(format!("materials: {}", materials.keys().copied().collect::<Vec<_>>().join(", ")))
+            }
+            None => diagnostic.help(format!("define it: `material {name} {{ kind = matt }}`")),
         });
         0
     }

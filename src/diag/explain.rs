@@ -29,13 +29,20 @@ const PAGES: &[(&str, &str)] = &[
     ("E0309", include_str!("explain/E0309.md")),
     ("W0310", include_str!("explain/W0310.md")),
     ("E0401", include_str!("explain/E0401.md")),
+    ("E0403", include_str!("explain/E0403.md")),
     ("E0405", include_str!("explain/E0405.md")),
     ("E0406", include_str!("explain/E0406.md")),
     ("E0407", include_str!("explain/E0407.md")),
     ("E0408", include_str!("explain/E0408.md")),
     ("E0410", include_str!("explain/E0410.md")),
+    ("E0501", include_str!("explain/E0501.md")),
+    ("W0502", include_str!("explain/W0502.md")),
+    ("E0503", include_str!("explain/E0503.md")),
     ("E0504", include_str!("explain/E0504.md")),
     ("E0505", include_str!("explain/E0505.md")),
+    ("E0601", include_str!("explain/E0601.md")),
+    ("W0602", include_str!("explain/W0602.md")),
+    ("E0801", include_str!("explain/E0801.md")),
 ];
 
 /// The page of a code such as `E0305`; `None` for a code that does not exist.

@@ -20,6 +20,12 @@ pub fn describe(text: &str, fault: &Fault, file: u32, offset: usize) -> Diagnost
     if let Some(slip) = dimension_slip(text, fault.at) {
         return Diagnostic::error(slip.code, span(slip.at, slip.len), slip.message).label(slip.label).help(slip.help);
     }
+    if let Some((at, word)) = bare_feature(text, fault.at) {
+        let message = format!("expected a feature (`add`, `cut`, `keep`), found `{word}`");
+        let meant = keyword_meant(word, &["`add`", "`cut`", "`keep`"]).unwrap_or_else(|| format!("add {word}"));
+        let help = format!("did you mean `{meant}`?");
+        return Diagnostic::error("E0101", span(at, word.len()), message).label("not a feature").help(help);
+    }
     let found = token_at(text, fault.at);
     let message = format!("expected {}, found {}", list(&fault.expected), spoken(found));
     let diagnostic =
@@ -28,6 +34,16 @@ pub fn describe(text: &str, fault: &Fault, file: u32, offset: usize) -> Diagnost
         Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
         None => diagnostic,
     }
+}
+
+/// The name in a line such as `shank = cylinder(…)`, where the parser took a field and gave up at the parenthesis.
+fn bare_feature(text: &str, at: usize) -> Option<(usize, &str)> {
+    let line_start = text[..at].rfind('\n').map_or(0, |i| i + 1);
+    let (name, shape) = text[line_start..at].split_once('=')?;
+    let indent = name.len() - name.trim_start().len();
+    let word = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    let bare = text[at..].starts_with('(') && word(name.trim()) && word(shape.trim());
+    bare.then(|| (line_start + indent, name.trim()))
 }
 
 struct Slip {
@@ -134,7 +150,11 @@ fn list(expected: &[&str]) -> String {
 
 /// The keyword that `found` was meant to be: misspelt, or grown together with the name behind it.
 fn keyword_meant(found: &str, expected: &[&str]) -> Option<String> {
-    let keywords: Vec<&str> = expected.iter().filter_map(|w| w.strip_prefix('`')?.strip_suffix('`')).collect();
+    let keywords: Vec<&str> = expected
+        .iter()
+        .filter_map(|w| w.strip_prefix('`')?.strip_suffix('`'))
+        .filter(|w| w.starts_with(|c: char| c.is_ascii_alphabetic()))
+        .collect();
     let glued = keywords.iter().find(|k| found.len() > k.len() && found.starts_with(**k));
     match glued {
         Some(keyword) => Some(format!("{keyword} {}", found[keyword.len()..].trim_start_matches('_'))),

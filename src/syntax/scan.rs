@@ -188,7 +188,8 @@ pub fn outside_strings(line: &str) -> impl Iterator<Item = (usize, u8)> {
 
 /// `part pin {`: an item that cannot stand inside another.
 fn starts_block_item(words: &str) -> bool {
-    let Some((first, rest)) = words.split_once(|c: char| !c.is_ascii_alphanumeric() && c != '_') else { return false };
+    let end = words.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(words.len());
+    let (first, rest) = words.split_at(end);
     let block = ["material", "part", "assembly", "station", "inspect", "train"];
     block.contains(&first) && !rest.trim_start().starts_with('=')
 }

@@ -1,0 +1,202 @@
+//! Parsing never panics, and formatting neither changes what a spec says nor itself.
+
+use gonogo::syntax::ast::{Body, File, Gap, Line, Stmt};
+use gonogo::syntax::{format, parse};
+use proptest::prelude::*;
+
+const SPECS: [&str; 3] = [
+    include_str!("../specs/pattern_wheel.gng"),
+    include_str!("../specs/four_screws.gng"),
+    include_str!("../specs/pinned_plate.gng"),
+];
+
+/// The tree without blank lines, which are layout.
+fn meaning(text: &str) -> serde_json::Value {
+    let (mut file, diagnostics) = parse(text, 0);
+    assert!(diagnostics.is_empty(), "{diagnostics:#?}\n{text}");
+    strip_file(&mut file);
+    serde_json::to_value(&file).unwrap()
+}
+
+fn strip_file(file: &mut File) {
+    strip_lines(&mut file.lines);
+    file.end.retain(|gap| *gap != Gap::Blank);
+}
+
+fn strip_lines(lines: &mut [Line]) {
+    for line in lines {
+        line.before.retain(|gap| *gap != Gap::Blank);
+        match &mut line.stmt {
+            Stmt::Material { body, .. }
+            | Stmt::Part { body, .. }
+            | Stmt::Assembly { body, .. }
+            | Stmt::Station { body, .. }
+            | Stmt::Camera { body, .. }
+            | Stmt::Floor(body)
+            | Stmt::Vary(body)
+            | Stmt::Inspect { body, .. }
+            | Stmt::Train(body) => strip_body(body),
+            Stmt::Place(place) => place.body.iter_mut().for_each(strip_body),
+            _ => {}
+        }
+    }
+}
+
+fn strip_body(body: &mut Body) {
+    strip_lines(&mut body.lines);
+    body.end.retain(|gap| *gap != Gap::Blank);
+}
+
+fn assert_formats(text: &str) {
+    let once = format(text).unwrap();
+    assert_eq!(meaning(&once), meaning(text), "{once}");
+    assert_eq!(format(&once).unwrap(), once);
+}
+
+#[test]
+fn formatting_keeps_what_the_specs_say() {
+    SPECS.iter().for_each(|text| assert_formats(text));
+}
+
+#[test]
+fn formatting_keeps_comments_everywhere() {
+    let text = "// head\ngonogo 1 // version\n\n\n\npart  pin{ // open\n// first\nmaterial=steel//behind\n\n\n add a=2x cylinder( // one\n d=6+0/-0.1, h=3 // two\n )at(1,2)turn(0 deg,0,(90 deg-a)) on line(pitch=3)\n// last\n\n}\ntrain{images=4}\n// end";
+    assert_formats(text);
+    let laid_out = format(text).unwrap();
+    for comment in ["// head", "// version", "// open", "// first", "//behind", "// one", "// two", "// last", "// end"]
+    {
+        assert_eq!(laid_out.matches(comment).count(), 1, "{comment}\n{laid_out}");
+    }
+}
+
+#[test]
+fn formatting_wraps_what_is_too_long() {
+    let text = format!(
+        "station s {{\n    light l = panel(width = 100, height = 100, at = ({0}, {0}, {0}), aim = ({0}, {0}, {0}))\n}}\n",
+        "1000000.000000"
+    );
+    assert_formats(&text);
+    assert!(format(&text).unwrap().contains("    light l = panel(\n        width = 100,\n"));
+}
+
+#[test]
+fn spellings_of_one_dimension_become_one() {
+    let canonical = "let a = 6 ±0.1 deg\n";
+    for spelling in ["let a=6+/-0.1°", "let  a = 6 ± 0.1 deg", "let a = 6 +/- 0.1 deg"] {
+        assert_eq!(format(spelling).unwrap(), canonical, "{spelling}");
+    }
+    assert_eq!(format("let b = 10 −0.005/−0.014").unwrap(), "let b = 10 -0.005/-0.014\n");
+}
+
+#[test]
+fn deep_nesting_is_refused_and_not_overflowed() {
+    for depth in [31, 33, 100_000] {
+        let text = format!("gonogo 1\nlet a = {}1{}\n", "(".repeat(depth), ")".repeat(depth));
+        assert_eq!(parse(&text, 0).1.is_empty(), depth <= 32, "{depth}");
+    }
+    parse(&"{".repeat(100_000), 0);
+    parse(&"part p {\n".repeat(10_000), 0);
+}
+
+#[test]
+fn a_long_statement_list_is_read_in_time() {
+    let text = format!("part p {{\n{}}}\n", "    cut a = cylinder(d = 6 H7, h = (a + b * (c - 1 mm)))\n".repeat(5_000));
+    assert!(parse(&text, 0).1.is_empty());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn garbage_never_panics(text in "\\PC{0,80}(\n\\PC{0,40}){0,6}") {
+        load(&text);
+    }
+
+    #[test]
+    fn words_of_the_language_in_any_order_never_panic(words in proptest::collection::vec(word(), 0..60)) {
+        load(&format!("gonogo 1\n{}", words.join(" ")));
+    }
+
+    #[test]
+    fn mutated_specs_never_panic(spec in 0usize..3, at in 0.0f64..1.0, cut in 0usize..40, insert in word()) {
+        let text = SPECS[spec];
+        let start = text.floor_char_boundary((at * text.len() as f64) as usize);
+        let end = text.ceil_char_boundary((start + cut).min(text.len()));
+        load(&format!("{}{insert}{}", &text[..start], &text[end..]));
+    }
+}
+
+fn load(text: &str) {
+    let loaded = gonogo::design::load("x.gng", &|_| Ok(text.to_string()), &[]);
+    assert_eq!(loaded.design.is_none(), loaded.diagnostics.iter().any(|d| d.is_error()));
+    gonogo::cli::report::human(&loaded.sources, &loaded.diagnostics, false);
+    if let Ok(laid_out) = format(text) {
+        assert_eq!(format(&laid_out).unwrap(), laid_out);
+    }
+}
+
+/// A token of the language, or something that nearly is one.
+fn word() -> impl Strategy<Value = String> {
+    let words = [
+        "part",
+        "material",
+        "assembly",
+        "station",
+        "place",
+        "on",
+        "at",
+        "cut",
+        "add",
+        "let",
+        "pin",
+        "steel",
+        "x",
+        "=",
+        "{",
+        "}",
+        "\n",
+        "(",
+        ")",
+        "[",
+        "]",
+        ",",
+        "..",
+        ".",
+        "±",
+        "+0.1/-0.2",
+        "H7",
+        "g6",
+        "1e308",
+        "-",
+        "*",
+        "/",
+        "(a / 0)",
+        "6 mm",
+        "3x",
+        "1000000000x",
+        "cylinder(d = 6, h = through)",
+        "circle(d = 3)",
+        "each",
+        "basic",
+        "free",
+        "\"",
+        "//",
+        "\r\n",
+        "%",
+        "°",
+        "{ mmc 1, lmc 2 }",
+        "use",
+        "train",
+        "inspect",
+        "watch",
+        "root",
+        "camera",
+        "light",
+        "room()",
+        "99999999999999999999",
+        "[0]",
+        "[1..3]",
+        "é",
+    ];
+    proptest::sample::select(words.to_vec()).prop_map(str::to_string)
+}
