@@ -5,6 +5,8 @@
 //!
 //! A spec that does not begin with `gonogo` is completed by [`FRAME`], with its lines in the place of the part `pin`.
 
+#![cfg(feature = "cli")]
+
 use gonogo::design::load;
 use std::collections::BTreeSet;
 use std::fs;

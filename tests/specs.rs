@@ -1,5 +1,7 @@
 //! The specifications users start from: each must load without a word of complaint and lie in canonical layout.
 
+#![cfg(feature = "compile")]
+
 use gonogo::design::model::{Design, Expr, LightShape, Sense};
 use gonogo::design::{Loaded, load};
 

@@ -1,5 +1,7 @@
 //! Parsing never panics, and formatting neither changes what a spec says nor itself.
 
+#![cfg(feature = "cli")]
+
 use gonogo::syntax::ast::{Body, File, Gap, Line, Stmt};
 use gonogo::syntax::{format, parse};
 use proptest::prelude::*;
