@@ -194,7 +194,7 @@ fn call(c: &Call, layout: Layout) -> String {
 fn args(list: &Args, layout: Layout) -> String {
     let arg = |a: &Arg| format!("{} = {}", a.key.text, value(&a.value));
     let commented = !list.end.is_empty() || list.list.iter().any(|a| !a.before.is_empty());
-    if !commented && !(layout == Layout::Broken && list.list.len() > 1) {
+    if !commented && (layout == Layout::Flat || list.list.len() < 2) {
         return format!("({})", list.list.iter().map(arg).collect::<Vec<_>>().join(", "));
     }
     let mut text = "(\n".to_string();
