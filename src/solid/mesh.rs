@@ -71,34 +71,71 @@ fn steps(surface: &Surface, rings: &[Ring], quality: &Quality) -> usize {
     }
 }
 
-/// A lattice of nodes inside a sphere's face, which is curved both ways; other faces need none.
+/// Nodes inside a face that is curved: without them a triangle between two holes would cut the bulge off. On a sphere rows
+/// of latitude; on a cylinder or cone that is no plain strip, a row at each height where the border has a node.
 fn inner_nodes(
     surface: &Surface,
     outline: &Outline,
     quality: &Quality,
     fresh: &mut dyn FnMut([f64; 2]) -> u32,
 ) -> Vec<Node> {
-    let Surface::Sphere { radius, .. } = surface else { return Vec::new() };
-    let steps = quality.steps(*radius);
-    let step = std::f64::consts::TAU * radius / steps as f64;
-    let border: Vec<[f64; 2]> =
-        outline.outer.iter().chain(outline.holes.iter().flatten()).map(|n| flat(surface, 1.0, n.uv)).collect();
-    let reach = border.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |r, p| [r[0].min(p[0]), r[1].max(p[0])]);
+    let Some(period) = surface.period() else { return Vec::new() };
+    if rows_of_strip(surface, outline).is_some() {
+        return Vec::new();
+    }
+    let (rows, steps) = lattice_rows(surface, outline, quality);
+    let step = period / steps as f64;
+    let girth = girth(surface, outline);
+    let point = |uv: [f64; 2]| flat(surface, girth, uv);
+    let segments = |ring: &[Node]| -> Vec<[[f64; 2]; 2]> {
+        (0..ring.len()).map(|i| [point(ring[i].uv), point(ring[(i + 1) % ring.len()].uv)]).collect()
+    };
+    let border: Vec<_> = std::iter::once(&outline.outer).chain(&outline.holes).flat_map(|r| segments(r)).collect();
+    let us = outline.outer.iter().map(|n| n.uv[0]);
+    let (left, right) = us.fold((f64::INFINITY, f64::NEG_INFINITY), |r, u| (r.0.min(u), r.1.max(u)));
+    let clearance = point([step, rows.first().copied().unwrap_or(0.0)])[0] * CLEARANCE;
     let mut nodes = Vec::new();
-    for row in 1..steps / 2 {
-        let latitude = row as f64 * step - radius * std::f64::consts::FRAC_PI_2;
-        let mut column = (reach[0] / step).ceil() as i64;
-        while column as f64 * step < reach[1] {
-            let p = [column as f64 * step, latitude];
-            let uv = [p[0], radius * (1.0 + (latitude / radius).sin())];
-            let apart = |q: &[f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]) > step / 2.0;
-            if outline.holds(uv) && border.iter().all(apart) {
+    for v in rows {
+        for column in (left / step).ceil() as i64..=(right / step).floor() as i64 {
+            let uv = [column as f64 * step, v];
+            if outline.holds(uv) && border.iter().all(|s| distance(point(uv), *s) > clearance) {
                 nodes.push(Node { uv, id: fresh(uv) });
             }
-            column += 1;
         }
     }
     nodes
+}
+
+/// Least distance of an inner node from the border, as a share of a step.
+const CLEARANCE: f64 = 0.4;
+
+/// Heights v of the rows, and nodes for a whole turn.
+fn lattice_rows(surface: &Surface, outline: &Outline, quality: &Quality) -> (Vec<f64>, usize) {
+    if let Surface::Sphere { radius, .. } = surface {
+        let steps = quality.steps(*radius);
+        let angle = std::f64::consts::TAU / steps as f64;
+        let height = |row: usize| radius * (1.0 - (row as f64 * angle).cos());
+        return ((1..steps / 2).map(height).collect(), steps);
+    }
+    let mut rows: Vec<f64> = outline.outer.iter().chain(outline.holes.iter().flatten()).map(|n| n.uv[1]).collect();
+    rows.sort_by(f64::total_cmp);
+    rows.dedup_by(|a, b| (*a - *b).abs() < tolerance::WELD);
+    (rows, quality.steps(girth_in_mm(surface, outline)))
+}
+
+/// Radius of a cylinder, mean radius of a cone's face.
+fn girth_in_mm(surface: &Surface, outline: &Outline) -> f64 {
+    match surface {
+        Surface::Cylinder { radius, .. } => *radius,
+        _ => girth(surface, outline),
+    }
+}
+
+fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
+    let (d, q) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+    let share = (d[0] * q[0] + d[1] * q[1]) / (d[0] * d[0] + d[1] * d[1]).max(f64::MIN_POSITIVE);
+    let share = share.clamp(0.0, 1.0);
+    (q[0] - d[0] * share).hypot(q[1] - d[1] * share)
 }
 
 /// The plane that a face is triangulated in: the chart with v stretched to distance along the surface, so that circles
@@ -150,8 +187,14 @@ fn fill(solid: &Solid, face: usize, patch: &Patch, mesh: &mut TriMesh) -> Option
 /// Triangles between two rows of nodes along circles about the axis: most faces of cylinders and cones, and flat
 /// quadrangles whose sides run along the chart.
 fn strip(surface: &Surface, patch: &Patch) -> Option<Vec<[Node; 3]>> {
-    let outer = &patch.outline.outer;
-    if !patch.inner.is_empty() || !patch.outline.holes.is_empty() || matches!(surface, Surface::Sphere { .. }) {
+    let (low, high) = rows_of_strip(surface, &patch.outline)?;
+    Some(zipped(&low, &high))
+}
+
+/// The two rows, by ascending u, of a face that has no other nodes.
+fn rows_of_strip(surface: &Surface, outline: &Outline) -> Option<(Vec<Node>, Vec<Node>)> {
+    let outer = &outline.outer;
+    if !outline.holes.is_empty() || matches!(surface, Surface::Sphere { .. }) {
         return None;
     }
     let reach = outer.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |r, n| [r[0].min(n.uv[1]), r[1].max(n.uv[1])]);
@@ -159,13 +202,13 @@ fn strip(surface: &Surface, patch: &Patch) -> Option<Vec<[Node; 3]>> {
     if reach[1] - reach[0] < tolerance::WELD || !outer.iter().all(|n| level(n, reach[0]) || level(n, reach[1])) {
         return None;
     }
-    let start = (0..outer.len())
-        .find(|i| level(&outer[*i], reach[0]) && !level(&outer[(i + outer.len() - 1) % outer.len()], reach[0]))?;
+    let before = |i: usize| &outer[(i + outer.len() - 1) % outer.len()];
+    let start = (0..outer.len()).find(|i| level(&outer[*i], reach[0]) && !level(before(*i), reach[0]))?;
     let turned = outer[start..].iter().chain(&outer[..start]).copied();
     let (low, mut high): (Vec<Node>, Vec<Node>) = turned.partition(|n| level(n, reach[0]));
     high.reverse();
     let ascends = |row: &[Node]| row.windows(2).all(|w| w[0].uv[0] < w[1].uv[0]);
-    (ascends(&low) && ascends(&high)).then(|| zipped(&low, &high))
+    (ascends(&low) && ascends(&high)).then_some((low, high))
 }
 
 /// Triangles between two rows of ascending u, the one that lags being advanced.

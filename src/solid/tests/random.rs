@@ -2,6 +2,7 @@
 
 use super::*;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 /// Edge of the cube of unit cells that the boxes lie in.
 const CELLS: i32 = 6;
@@ -61,7 +62,7 @@ fn round_or_square() -> impl Strategy<Value = (Shape, PoseExpr)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
     #[test]
     fn boxes_on_a_lattice_have_the_volume_of_their_cells(boxes in prop::collection::vec(lattice_box(), 1..7)) {
