@@ -114,6 +114,16 @@ fn the_runtime_needs_none_of_the_compilers_crates() {
 }
 
 #[test]
+fn every_code_has_a_page() {
+    let pages: Vec<&str> = gonogo::diag::codes().collect();
+    for source in sources() {
+        for code in codes(&source.code) {
+            assert!(pages.contains(&code), "{}: {code} has no page in src/diag/explain", source.path);
+        }
+    }
+}
+
+#[test]
 fn files_stay_short_enough_to_read() {
     const LONGEST: usize = 600;
     for source in sources() {
@@ -174,6 +184,12 @@ fn rooms_used(code: &str) -> Vec<String> {
     // Names with a capital are items of lib.rs itself, re-exported from below.
     used.retain(|name| name.starts_with(|c: char| c.is_ascii_lowercase()));
     used
+}
+
+/// `E0305` and the like, behind a quotation mark.
+fn codes(code: &str) -> impl Iterator<Item = &str> {
+    let is_code = |c: &&str| c.starts_with(['E', 'W']) && c[1..].bytes().all(|b| b.is_ascii_digit());
+    code.match_indices('"').filter_map(|(at, _)| code.get(at + 1..at + 6)).filter(is_code)
 }
 
 /// Whether `word` occurs without being the end of a longer name.

@@ -43,6 +43,13 @@ const PAGES: &[(&str, &str)] = &[
     ("E0601", include_str!("explain/E0601.md")),
     ("W0602", include_str!("explain/W0602.md")),
     ("E0801", include_str!("explain/E0801.md")),
+    ("E0802", include_str!("explain/E0802.md")),
+    ("E0803", include_str!("explain/E0803.md")),
+    ("E0804", include_str!("explain/E0804.md")),
+    ("E0805", include_str!("explain/E0805.md")),
+    ("E0806", include_str!("explain/E0806.md")),
+    ("E0807", include_str!("explain/E0807.md")),
+    ("E0808", include_str!("explain/E0808.md")),
 ];
 
 /// The page of a code such as `E0305`; `None` for a code that does not exist.
