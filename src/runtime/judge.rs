@@ -10,9 +10,9 @@ use super::model::{Hypothesis, Image, Model, Node};
 use super::pose::Pose;
 use super::window::{Frame, Placed, Stencil, Window, mask_of};
 
-/// Local search: shifts of up to this many node px each way, in half steps.
+/// Local search: shifts of up to this many px of the photo each way. More would let a part that stands too high pass as
+/// one that stands a little further back.
 const SHIFTS: i32 = 2;
-const SHIFT_STEP: f64 = 0.5;
 /// Photo values from here on count as clipped.
 pub const CLIP: f32 = 0.98;
 /// Resolution levels per node.
@@ -162,10 +162,11 @@ impl NodeImages {
 
     /// Log prior, shift and coefficients for every shift of the local search.
     fn shifted(&self, reduced: &Grid, placed: &Placed) -> Vec<(f64, [f64; 2], Vec<f32>)> {
+        let step = 1.0 / f64::from(self.window.frame.factor);
         let mut out = Vec::new();
         for j in -SHIFTS..=SHIFTS {
             for i in -SHIFTS..=SHIFTS {
-                let shift = [f64::from(i) * SHIFT_STEP, f64::from(j) * SHIFT_STEP];
+                let shift = [f64::from(i) * step, f64::from(j) * step];
                 let prior: f64 = (0..2).map(|k| -0.5 * (shift[k] / self.spread[k]).powi(2)).sum();
                 let (image, _) = self.window.cut(reduced, placed, shift);
                 out.push((prior, shift, self.stencil.coefficients(&image)));
