@@ -6,10 +6,11 @@
 
 use super::model::Expr;
 use super::scope::{Named, Remark, Resolver, Typed, Use};
+use super::sum::scaled;
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::iso::{self, FitError};
-use crate::syntax::ast::{self, Size, Sum, Tolerance};
+use crate::syntax::ast::{self, Size, Tolerance};
 use crate::units::{Quantity, Range};
 
 /// Larger numbers (mm, rad, px) are slips of the pen or overflow.
@@ -348,7 +349,7 @@ impl Resolver {
     }
 
     /// mm, rad, 1 or px in the file's unit.
-    fn file_scale(&self, quantity: Quantity, span: Span) -> f64 {
+    pub fn file_scale(&self, quantity: Quantity, span: Span) -> f64 {
         let title = self.title(span);
         match quantity {
             Quantity::Length => title.length,
@@ -357,7 +358,7 @@ impl Resolver {
         }
     }
 
-    fn quantity(&mut self, q: &ast::Quantity) -> Option<Typed> {
+    pub fn quantity(&mut self, q: &ast::Quantity) -> Option<Typed> {
         let Some(name) = &q.unit else {
             return Some(Typed { expr: Expr::Const(q.number.value), quantity: None });
         };
@@ -377,55 +378,6 @@ impl Resolver {
         Some(Typed { expr: Expr::Const(q.number.value * factor), quantity: Some(quantity) })
     }
 
-    fn sum(&mut self, sum: &Sum, usage: Use) -> Option<Typed> {
-        match sum {
-            Sum::Quantity(q) => self.quantity(q),
-            Sum::Path(path) => self.lookup(path, usage),
-            Sum::Group(inner) => self.sum(inner, usage),
-            Sum::Negative(inner) => {
-                let value = self.sum(inner, usage)?;
-                Some(Typed { expr: folded(Expr::Neg(Box::new(value.expr))), quantity: value.quantity })
-            }
-            Sum::Binary(sign, a, b) => {
-                let (a, b) = (self.sum(a, usage), self.sum(b, usage));
-                self.binary(*sign, a?, b?, sum_span(sum))
-            }
-        }
-    }
-
-    fn binary(&mut self, sign: char, a: Typed, b: Typed, span: Span) -> Option<Typed> {
-        let quantity = match (sign, a.quantity, b.quantity) {
-            ('+' | '-', x, y) if x == y => x,
-            ('+' | '-', Some(q), None) | ('+' | '-', None, Some(q)) => Some(q),
-            ('*', Some(Quantity::Ratio) | None, q) | ('*' | '/', q, Some(Quantity::Ratio) | None) => q,
-            ('/', x, y) if x == y => Some(Quantity::Ratio),
-            (_, Some(x), Some(y)) if matches!(sign, '+' | '-') => {
-                self.wrong_quantity(x, y, span);
-                return None;
-            }
-            _ => {
-                let message = format!("this has no quantity: {} {sign} {}", spoken(a.quantity), spoken(b.quantity));
-                self.report(
-                    Diagnostic::error("E0205", span, message).label("neither a length nor an angle nor a ratio"),
-                );
-                return None;
-            }
-        };
-        let additive = matches!(sign, '+' | '-');
-        let scale = |t: Typed, resolver: &Self| match (additive, t.quantity, quantity) {
-            (true, None, Some(q)) => scaled(t.expr, resolver.file_scale(q, span)),
-            _ => t.expr,
-        };
-        let (a, b) = (Box::new(scale(a, self)), Box::new(scale(b, self)));
-        let expr = match sign {
-            '+' => Expr::Add(a, b),
-            '-' => Expr::Sub(a, b),
-            '*' => Expr::Mul(a, b),
-            _ => Expr::Div(a, b),
-        };
-        Some(Typed { expr: folded(expr), quantity })
-    }
-
     fn coerce(&mut self, typed: Typed, want: Quantity, span: Span) -> Option<Expr> {
         let scale = self.bare_scale(typed.quantity, want, span)?;
         Some(scaled(typed.expr, scale))
@@ -443,7 +395,7 @@ impl Resolver {
         }
     }
 
-    fn wrong_quantity(&mut self, want: Quantity, got: Quantity, span: Span) {
+    pub fn wrong_quantity(&mut self, want: Quantity, got: Quantity, span: Span) {
         let message = format!("expected {}, this is {}", spoken(Some(want)), spoken(Some(got)));
         let unit = match want {
             Quantity::Length => "mm",
@@ -526,42 +478,13 @@ pub fn trim(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
-/// An operation on two constants as a constant: nominal values hold nothing else.
-fn folded(expr: Expr) -> Expr {
-    let constants = match &expr {
-        Expr::Neg(a) => matches!(**a, Expr::Const(_)),
-        Expr::Add(a, b) | Expr::Sub(a, b) | Expr::Mul(a, b) | Expr::Div(a, b) => {
-            matches!((&**a, &**b), (Expr::Const(_), Expr::Const(_)))
-        }
-        Expr::Const(_) | Expr::Dim(_) => false,
-    };
-    if constants { Expr::Const(expr.eval(&[])) } else { expr }
-}
-
-fn scaled(expr: Expr, scale: f64) -> Expr {
-    match expr {
-        expr if scale == 1.0 => expr,
-        Expr::Const(v) => Expr::Const(v * scale),
-        expr => Expr::Mul(Box::new(Expr::Const(scale)), Box::new(expr)),
-    }
-}
-
-fn spoken(quantity: Option<Quantity>) -> &'static str {
+/// With its article, for messages.
+pub fn spoken(quantity: Option<Quantity>) -> &'static str {
     match quantity {
         Some(Quantity::Length) => "a length",
         Some(Quantity::Angle) => "an angle",
         Some(Quantity::Ratio) => "a ratio",
         Some(Quantity::Pixels) => "a number of pixels",
         None => "a number",
-    }
-}
-
-/// From the first operand to the last.
-fn sum_span(sum: &Sum) -> Span {
-    match sum {
-        Sum::Quantity(q) => q.span,
-        Sum::Path(path) => path.span,
-        Sum::Negative(a) | Sum::Group(a) => sum_span(a),
-        Sum::Binary(_, a, b) => Span { end: sum_span(b).end, ..sum_span(a) },
     }
 }

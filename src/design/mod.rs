@@ -14,6 +14,7 @@ mod pattern;
 mod scope;
 mod sense;
 mod station;
+mod sum;
 mod task;
 
 pub use load::{Loaded, Read, load};
