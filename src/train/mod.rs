@@ -16,7 +16,7 @@ use crate::assembly::fault::ErrorMode;
 use crate::design::model::{Design, Response, Station};
 use crate::diag::Diagnostic;
 use crate::runtime::camera::Camera;
-use crate::runtime::model::{self, FORMAT, Install, Lamp, Model, Promise, Rate};
+use crate::runtime::model::{self, FORMAT, Install, Lamp, ModeRate, Model, Promise, Rate};
 use crate::runtime::photo::Tone;
 use crate::runtime::pose::Pose;
 use crate::scene::build;
@@ -28,11 +28,15 @@ use synthesise::{Draws, Shots, synthesise};
 
 /// Customers imagined for the held-out renders.
 const CUSTOMERS: u64 = 2;
-/// Held-out draws per customer; the first calibrates.
-const HELD_OUT_DRAWS: u32 = 6;
+/// Held-out draws of good assemblies per customer, the first of which calibrates, and of every error mode.
+const HELD_OUT_GOOD: u32 = 13;
+const HELD_OUT_FAULTY: u32 = 5;
 /// Bright matt surfaces reach this grey value (share of full scale) under the described lamps.
 const EXPOSED_TO: f64 = 0.6;
 const EXPOSED_QUANTILE: f64 = 0.95;
+
+/// A mode of which more than this share escapes is worth a warning.
+const WEAK: f64 = 0.1;
 
 /// What training starts from.
 pub struct Job<'a> {
@@ -65,14 +69,16 @@ pub fn train(job: &Job, observer: &Observer) -> Result<(Model, Vec<Diagnostic>),
     observer(Step::Plan, 0, 1);
     let nominal = shots::nominal(job.design, job.station)?;
     let plan = plan::plan(job.design, &job.camera, &nominal, job.modes);
-    let doubts = doubts(job, &plan);
-    let draws = Draws { seed: job.design.train.seed, count: job.design.train.images.max(2) };
+    let mut doubts = doubts(job, &plan);
+    let images = job.design.train.images.max(2);
+    let draws = Draws { seed: job.design.train.seed, count: images, faulty: images };
     let shots = render(job, &plan, &job.camera, draws, &|i, n| observer(Step::Render, i, n))?;
     observer(Step::Fit, 0, 1);
     let mut model = fit_model(job, &plan, &shots);
     let held_out = held_out(job, &plan, &model, observer)?;
     observer(Step::Verify, 0, 1);
     verify::verify(&mut model, job.design, &plan, job.modes, &held_out);
+    doubts.extend(overlaps(job, &model));
     Ok((model, doubts))
 }
 
@@ -90,6 +96,21 @@ fn doubts(job: &Job, plan: &Plan) -> Vec<Diagnostic> {
     plan.unseen.iter().map(blind).collect()
 }
 
+/// Faults that the model lets pass too often to rely on it.
+fn overlaps(job: &Job, model: &Model) -> Vec<Diagnostic> {
+    let weak = model.promise.modes.iter().filter(|m| f64::from(m.escape.events) > WEAK * f64::from(m.escape.trials));
+    let doubt = |mode: &ModeRate| {
+        let component = job.design.components.iter().find(|c| c.name == mode.component);
+        let (escaped, trials) = (mode.escape.events, mode.escape.trials);
+        let message =
+            format!("station `{}` can hardly tell when `{}` is {}", job.station.name, mode.component, mode.fault);
+        Diagnostic::warning("W0703", component.map_or(job.station.span, |c| c.span), message)
+            .label(format!("{escaped} of {trials} synthetic photos with this fault pass"))
+            .note("a go says little about this fault; another view or another light may show it")
+    };
+    weak.map(doubt).collect()
+}
+
 /// Shots of all scenes of some draws by a camera.
 fn render(
     job: &Job,
@@ -105,7 +126,7 @@ fn render(
         samples: job.design.train.samples,
         blur: job.station.camera.blur.nominal / f64::from(plan.base),
     };
-    let total = draws.count as usize * (1 + plan.scenes.len());
+    let total = draws.shots(plan);
     let done = std::cell::Cell::new(0);
     progress(0, total);
     synthesise(job.design, &setup, plan, job.modes, draws, &|| {
@@ -198,7 +219,7 @@ fn held_out(
             let customer = verify::customer(model, index);
             let camera = customer.installation.apply(&job.camera);
             // Another seed than training's: these draws must be new.
-            let draws = Draws { seed: customer.seed, count: HELD_OUT_DRAWS };
+            let draws = Draws { seed: customer.seed, count: HELD_OUT_GOOD, faulty: HELD_OUT_FAULTY };
             let progress = |i: usize, n: usize| observer(Step::HeldOut, index as usize * n + i, CUSTOMERS as usize * n);
             Ok((customer, render(job, plan, &camera, draws, &progress)?))
         })

@@ -35,6 +35,17 @@ fn at_most(events: u32, trials: u32, p: f64) -> f64 {
     sum
 }
 
+/// The z below which a standard normal falls with probability `p` (Abramowitz and Stegun 26.2.23, error below 4.5e-4).
+pub fn normal_quantile(p: f64) -> f64 {
+    if p < 0.5 {
+        return -normal_quantile(1.0 - p);
+    }
+    let t = (-2.0 * (1.0 - p).max(1e-12).ln()).sqrt();
+    let top = 2.515_517 + t * (0.802_853 + t * 0.010_328);
+    let bottom = 1.0 + t * (1.432_788 + t * (0.189_269 + t * 0.001_308));
+    t - top / bottom
+}
+
 /// Four decimals: what a person reads, and the same on every machine.
 pub fn rounded(v: f64) -> f64 {
     (v * 1e4).round() / 1e4
@@ -43,6 +54,13 @@ pub fn rounded(v: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn normal_quantiles_match_the_table() {
+        for (p, z) in [(0.5, 0.0), (0.975, 1.959_964), (0.999, 3.090_232), (0.05, -1.644_854)] {
+            assert!((normal_quantile(p) - z).abs() < 5e-4);
+        }
+    }
 
     #[test]
     fn clopper_pearson_matches_published_values() {

@@ -20,11 +20,19 @@ pub struct FaultyShot {
     pub places: Vec<f64>,
 }
 
-/// Which draws: the seed of their streams and how many.
+/// Which draws: the seed of their streams and how many, of which the first `faulty` are taken in every faulty scene too.
 #[derive(Debug, Clone, Copy)]
 pub struct Draws {
     pub seed: u64,
     pub count: u32,
+    pub faulty: u32,
+}
+
+impl Draws {
+    /// Number of shots of a plan.
+    pub fn shots(&self, plan: &Plan) -> usize {
+        self.count as usize + self.faulty.min(self.count) as usize * plan.scenes.len()
+    }
 }
 
 /// Renders every draw in every scene, with `done` called after each shot.
@@ -42,6 +50,9 @@ pub fn synthesise(
         let mut noise = Stream::new(draws.seed, "render", image);
         out.good.push(shots::take(setup, &drawn, &drawn.instance(&[]), noise.bits()));
         done();
+        if image >= u64::from(draws.faulty) {
+            continue;
+        }
         for (scene, taken) in plan.scenes.iter().zip(&mut out.faulty) {
             let sizes: Vec<[f64; 3]> = scene.iter().map(|&m| place_in_sweep(draws.seed, m, image)).collect();
             let faults: Vec<_> = scene.iter().map(|&m| &modes[m]).zip(sizes.iter().copied()).collect();

@@ -4,7 +4,7 @@
 //! imagined installed with an error, lit by lamps of other powers, and calibrated with one photo, as a customer would.
 
 use super::plan::Plan;
-use super::stats::{rate, rounded};
+use super::stats::{normal_quantile, rate, rounded};
 use super::synthesise::{FaultyShot, Shots};
 use crate::assembly::fault::ErrorMode;
 use crate::design::model::Design;
@@ -106,6 +106,7 @@ fn judge(model: &Model, plan: &Plan, customer: &Customer, shots: &Shots) -> Opti
 
 /// Scores of every node on goods and on its own faults.
 fn scores(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], judged: &[Judged]) {
+    let nodes = model.nodes.len();
     for (index, node) in model.nodes.iter_mut().enumerate() {
         let of = |verdict: &Verdict| verdict.nodes.get(index).map(|n| rounded(n.score));
         let mut good: Vec<f64> = judged.iter().flat_map(|j| &j.good).filter_map(of).collect();
@@ -116,9 +117,25 @@ fn scores(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], 
             faulty.filter(|(_, scene)| shown(scene)).flat_map(|(verdicts, _)| verdicts).filter_map(of).collect();
         good.sort_by(f64::total_cmp);
         fault.sort_by(f64::total_cmp);
+        node.threshold = rounded(threshold(&good, &fault, design.inspect.false_reject / nodes as f64));
         node.good_scores = good;
         node.fault_scores = fault;
     }
+}
+
+/// The log-likelihood ratio below which a node counts as faulty. The sign decides, or midway between the extremes where
+/// they lie apart but below zero. Where good and faulty renders overlap, no threshold is right: the promised rate of false
+/// rejects is kept by the goods' own mean and spread, and what escapes is counted. Never a quantile of the goods: its
+/// few lowest scores say nothing about the photo's.
+fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
+    let (Some(lowest), Some(highest)) = (good.first(), fault.last()) else { return 0.0 };
+    if lowest > highest {
+        return ((lowest + highest) / 2.0).min(0.0);
+    }
+    let n = good.len() as f64;
+    let mean = good.iter().sum::<f64>() / n;
+    let deviation = (good.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt();
+    (mean - normal_quantile(1.0 - false_reject) * deviation).min(0.0)
 }
 
 fn accept(judged: &[Judged]) -> f64 {
@@ -134,7 +151,9 @@ fn promise(
     judged: &[Judged],
     unfit: usize,
 ) -> Promise {
-    let rejected = |v: &&Verdict| v.nodes.is_empty() || v.nodes.iter().any(|n| n.faulty);
+    // The verdicts were taken before the thresholds were known.
+    let faulty = |v: &Verdict, node: usize| v.nodes[node].score < model.nodes[node].threshold;
+    let rejected = |v: &&Verdict| v.nodes.is_empty() || (0..v.nodes.len()).any(|n| faulty(v, n));
     let goods: Vec<&Verdict> = judged.iter().flat_map(|j| &j.good).collect();
     let false_rejects = goods.iter().filter(|v| rejected(v)).count() + unfit;
     let mut rates = Vec::new();
@@ -145,7 +164,7 @@ fn promise(
             let Some(node) = model.nodes.iter().position(|n| &n.name == component) else { continue };
             let verdicts: Vec<&Verdict> = judged.iter().flat_map(|j| &j.faulty[scene]).collect();
             // A photo in which the assembly is not found is not passed: it does not escape.
-            let passed = |v: &&&Verdict| v.nodes.get(node).is_some_and(|n| !n.faulty);
+            let passed = |v: &&&Verdict| !v.nodes.is_empty() && !faulty(v, node);
             let escaped = verdicts.iter().filter(passed).count() as u32;
             escapes += escaped;
             trials += verdicts.len() as u32;
