@@ -166,8 +166,8 @@ fn summarise(model: &Model, path: &Path) -> Result<(), Failure> {
     output::line(&format!("{}: station {}, {nodes} nodes", path.display(), model.station.name))?;
     output::line(&format!("  predicted false rejects: {}", rate(&promise.false_reject)))?;
     output::line(&format!("  predicted escapes:       {}", rate(&promise.escape)))?;
-    let escapes = promise.modes.iter().filter(|m| m.escape.events > 0);
-    escapes.map(|m| output::line(&format!("    {} {}: {}", m.component, m.fault, rate(&m.escape)))).collect()
+    let mut escapes = promise.modes.iter().filter(|m| m.escape.events > 0);
+    escapes.try_for_each(|m| output::line(&format!("    {} {}: {}", m.component, m.fault, rate(&m.escape))))
 }
 
 fn rate(rate: &Rate) -> String {

@@ -40,7 +40,8 @@ fn draw(picture: &mut RgbImage, verdict: &Verdict) {
         }
     }
     if let Some(outline) = verdict.outline {
-        pen.quad(outline, ASSEMBLY, 2);
+        // A little outside the outermost node, whose box would cover it.
+        pen.quad(shrunk(outline, -GAP), ASSEMBLY, 2);
     }
     verdict.nodes.iter().for_each(|node| pen.node(node));
     for (row, finding) in verdict.findings.iter().enumerate() {
@@ -130,13 +131,15 @@ impl Pen<'_> {
     }
 }
 
-/// The corners moved towards the centre by `by` px along each half diagonal, but never past it.
+/// The corners moved towards the centre so that the sides come closer by about `by` px (apart if negative), but never
+/// past it.
 fn shrunk(corners: [Point; 4], by: f64) -> [Point; 4] {
     let centre = [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / 4.0);
     corners.map(|corner| {
         let arm = [corner[0] - centre[0], corner[1] - centre[1]];
         let reach = arm[0].abs().min(arm[1].abs());
-        let share = if reach > by { 1.0 - by / reach } else { 0.2 };
+        // What is smaller than the step keeps a fifth of its size, so that it stays in sight.
+        let share = if reach > by.abs() { 1.0 - by / reach } else { 0.2 };
         [centre[0] + arm[0] * share, centre[1] + arm[1] * share]
     })
 }

@@ -30,11 +30,11 @@ impl Monitor {
 
     /// To be told by the compiler.
     pub fn note(&self, progress: Progress) {
-        if let Ok(mut times) = self.times.lock() {
-            if times.stage != Some(progress.stage) {
-                times.turn(Some(progress.stage));
-                self.bar.set_message(format!("{:<10}", progress.stage.name()));
-            }
+        if let Ok(mut times) = self.times.lock()
+            && times.stage != Some(progress.stage)
+        {
+            times.turn(Some(progress.stage));
+            self.bar.set_message(format!("{:<10}", progress.stage.name()));
         }
         self.bar.set_length(progress.total as u64);
         self.bar.set_position(progress.done as u64);

@@ -222,7 +222,7 @@ mod tests {
             (state >> 40) as f32 / (1u64 << 24) as f32
         };
         let mut normal = || (0..12).map(|_| uniform()).sum::<f32>() - 6.0;
-        let bars = |i: usize| if (i / 16) % 2 == 0 { 0.2 } else { 0.7 };
+        let bars = |i: usize| if (i / 16).is_multiple_of(2) { 0.2 } else { 0.7 };
         let light = Grid::new(128, 128, (0..128 * 128).map(|i| bars(i % 128) + 0.02 * normal()).collect());
         let sigma = noise_of(&light);
         assert!((sigma / 0.02 - 1.0).abs() < 0.06, "{sigma}");

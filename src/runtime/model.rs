@@ -310,7 +310,10 @@ impl Node {
 impl Hypothesis {
     /// The images are all draws of all lamps, in order.
     fn check(&self, lamps: usize, width: usize, height: usize) -> Result<(), &'static str> {
-        ensure(self.images.len() % lamps == 0 && self.images.len() >= 2 * lamps, "number of images of a hypothesis")?;
+        ensure(
+            self.images.len().is_multiple_of(lamps) && self.images.len() >= 2 * lamps,
+            "number of images of a hypothesis",
+        )?;
         ensure(self.images.len() <= 10_000, "too many images")?;
         for (i, image) in self.images.iter().enumerate() {
             let place = image.draw as usize == i / lamps && image.lamp as usize == i % lamps;

@@ -119,6 +119,10 @@ impl Stencil {
         2 * self.cells.len()
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.cells.is_empty()
+    }
+
     /// H and V of every cell.
     pub fn coefficients(&self, image: &Grid) -> Vec<f32> {
         let integral = Integral::new(image);
