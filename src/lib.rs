@@ -95,8 +95,9 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     line.emit_images(|| artifacts::images::pictures(&design, station, &camera, &modes));
 
     line.enter(Stage::Plan)?;
-    let (spec, datum) = (line::digest(&design), line::datum(&design, &modes));
-    let job = train::Job { design: &design, station, camera, modes: &modes, datum: &datum, spec };
+    let (spec, datum) = (line::digest(&design), line::datum(&design, &analysis.liaison, &modes));
+    let tree = &assembly::error_tree::error_tree(&analysis.liaison, 0, None);
+    let job = train::Job { design: &design, station, camera, modes: &modes, tree, datum: &datum, spec };
     let trained = train::train(&job, &|step, done, total| line.tell(step.into(), done, total));
     let (model, doubts) = line.accept(trained)?;
     line.out.model = Some(model);

@@ -4,7 +4,8 @@
 use crate::artifacts::{self, Artifact};
 use crate::assembly::Analysis;
 use crate::assembly::error_tree::ErrorTree;
-use crate::assembly::fault::ErrorMode;
+use crate::assembly::fault::{self, ErrorMode, FaultKind};
+use crate::assembly::liaison::Liaison;
 use crate::assembly::place::place;
 use crate::design::Loaded;
 use crate::design::model::{Design, Part, Station};
@@ -238,9 +239,15 @@ pub(crate) fn bodies(design: &Design, station: &Station, solids: &[Arc<Solid>]) 
     build::bodies(&instance, shots::standing(station).map(|[low, high]| (low + high) / 2.0))
 }
 
-/// Per component: no modelled fault carries it away, so it may serve to locate the assembly.
-pub(crate) fn datum(design: &Design, modes: &[ErrorMode]) -> Vec<bool> {
-    (0..design.components.len()).map(|c| modes.iter().all(|m| m.component != c)).collect()
+/// Per component: no misplaced part takes it along or hides it, so it may serve to locate the assembly. A component that is
+/// missing or stands too high does not mislead: its edges are few among many.
+pub(crate) fn datum(design: &Design, liaison: &Liaison, modes: &[ErrorMode]) -> Vec<bool> {
+    let mut firm = vec![true; design.components.len()];
+    for mode in modes.iter().filter(|m| m.kind == FaultKind::Misplaced) {
+        let kept = fault::datum(liaison, mode);
+        firm.iter_mut().enumerate().for_each(|(c, firm)| *firm &= kept.contains(&c));
+    }
+    firm
 }
 
 /// Digest of the design as resolved: layout and comments of the spec do not count, overridden values do.

@@ -12,11 +12,12 @@ mod stats;
 pub mod synthesise;
 pub mod verify;
 
+use crate::assembly::error_tree::ErrorTree;
 use crate::assembly::fault::ErrorMode;
 use crate::design::model::{Design, Response, Station};
 use crate::diag::Diagnostic;
 use crate::runtime::camera::Camera;
-use crate::runtime::model::{self, FORMAT, Install, Lamp, ModeRate, Model, Promise, Rate};
+use crate::runtime::model::{self, FORMAT, Install, Lamp, ModeRate, Model, Node, Promise, Rate};
 use crate::runtime::photo::Tone;
 use crate::runtime::pose::Pose;
 use crate::scene::build;
@@ -45,6 +46,8 @@ pub struct Job<'a> {
     /// The camera as designed (full resolution).
     pub camera: Camera,
     pub modes: &'a [ErrorMode],
+    /// The tree of the whole assembly, from the component everything stands on.
+    pub tree: &'a ErrorTree,
     /// Per component: no modelled fault carries it away, so it may serve to locate the assembly.
     pub datum: &'a [bool],
     /// Digest of the resolved spec.
@@ -155,7 +158,8 @@ fn fit_model(job: &Job, plan: &Plan, shots: &Shots) -> Model {
         powers: &powers,
         drift: &drift,
     };
-    let nodes = plan.nodes.par_iter().filter_map(|node| fit::node(&context, node)).collect();
+    let mut nodes: Vec<Node> = plan.nodes.par_iter().filter_map(|node| fit::node(&context, node)).collect();
+    hang(&mut nodes, job.design, job.tree);
     let unmeasured = Rate { events: 0, trials: 0, upper_95: 1.0 };
     Model {
         format: FORMAT,
@@ -172,6 +176,19 @@ fn fit_model(job: &Job, plan: &Plan, shots: &Shots) -> Model {
         },
         locator: fit::locator(&context, job.datum),
         nodes,
+    }
+}
+
+/// Hangs the nodes into the object tree: each below the nearest node on its way to the tree's root.
+fn hang(nodes: &mut [Node], design: &Design, tree: &ErrorTree) {
+    let place = |name: &str| tree.nodes.iter().position(|t| design.components[t.component].name == name);
+    let names: Vec<String> = nodes.iter().map(|n| n.name.clone()).collect();
+    let above = |at: usize| std::iter::successors(tree.nodes[at].parent, |&p| tree.nodes[p].parent);
+    let node_at = |at: usize| names.iter().position(|n| *n == design.components[tree.nodes[at].component].name);
+    for node in nodes {
+        let ancestors: Vec<usize> = place(&node.name).into_iter().flat_map(above).filter_map(node_at).collect();
+        node.parent = ancestors.first().map(|&p| p as u32);
+        node.level = 1 + ancestors.len() as u32;
     }
 }
 
