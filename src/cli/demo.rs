@@ -10,6 +10,7 @@ use super::verdict::{Outcome, word};
 use super::{Exit, messages};
 use crate::Options;
 use crate::artifacts::Artifact;
+use crate::diag::Diagnostic;
 use crate::runtime::calibrate;
 use crate::runtime::inspect::{Decision, Inspector};
 use crate::runtime::model::Model;
@@ -63,7 +64,11 @@ fn compiled(spec: &Path, args: &Demo, global: &Global) -> Result<Option<Model>, 
     output::line(&format!("compiling {SPEC} for station {STATION} …"))?;
     let start = Instant::now();
     let compiled = args.jobs.run(|| compile::run(&document, &options, global))?;
-    messages::print(&compiled.diagnostics, &compiled.sources, global)?;
+    let (errors, warnings): (Vec<_>, Vec<_>) = compiled.diagnostics.into_iter().partition(Diagnostic::is_error);
+    messages::print(&errors, &compiled.sources, global)?;
+    if !warnings.is_empty() {
+        output::line(&format!("{} warnings, which `gonogo check {SPEC}` shows", warnings.len()))?;
+    }
     output::line(&format!("compiled in {:.1} s, without any photo", start.elapsed().as_secs_f64()))?;
     Ok(compiled.model)
 }

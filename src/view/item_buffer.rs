@@ -1,7 +1,7 @@
 //! The item buffer: which component, which face and how far, for every pixel of a camera.
 //!
 //! In: bodies in the station's frame and a [`Camera`]. Out: an [`ItemBuffer`]: identities, counts, boxes, masks. Never
-//! shades, never knows a design. How it is drawn: [`super::raster`].
+//! shades, never knows a design. How it is drawn: `raster`.
 
 use super::raster::Canvas;
 pub use super::raster::PixelGrid;
