@@ -158,7 +158,7 @@ fn collect(folder: &Path, prefix: &str, found: &mut Vec<Source>) {
 
 /// Files behind `#[cfg(test)]` may use what they like.
 fn is_for_tests(path: &str) -> bool {
-    ["tests.rs", "sample.rs", "shapes.rs"].iter().any(|name| path.ends_with(&format!("/{name}")))
+    path.contains("/tests/") || ["tests.rs", "sample.rs", "shapes.rs"].iter().any(|n| path.ends_with(&format!("/{n}")))
 }
 
 fn code(text: &str) -> String {

@@ -42,6 +42,7 @@ const PAGES: &[(&str, &str)] = &[
     ("E0505", include_str!("explain/E0505.md")),
     ("E0601", include_str!("explain/E0601.md")),
     ("W0602", include_str!("explain/W0602.md")),
+    ("W0703", include_str!("explain/W0703.md")),
     ("E0801", include_str!("explain/E0801.md")),
     ("E0802", include_str!("explain/E0802.md")),
     ("E0803", include_str!("explain/E0803.md")),
