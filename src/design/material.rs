@@ -18,7 +18,11 @@ const COAT: [f64; 2] = [1.5, 0.0];
 /// Size of blotches when nothing is said (mm).
 const BLOTCH: f64 = 8.0;
 
-const FIELDS: [&str; 8] = ["kind", "metal", "n", "k", "reflectance", "roughness", "mottle", "mottle_size"];
+/// Broken edges when nothing is said (mm): what a deburring tool leaves.
+const EDGE_BREAK: Range = Range { low: 0.05, nominal: 0.1, high: 0.2 };
+
+const FIELDS: [&str; 9] =
+    ["kind", "metal", "n", "k", "reflectance", "roughness", "edge_break", "mottle", "mottle_size"];
 
 impl Resolver {
     pub fn material(&mut self, name: &Name, body: &Body) -> Material {
@@ -39,6 +43,7 @@ impl Resolver {
             k: self.exact_or(&fields, "k", Quantity::Ratio, index[1], [0.0, 20.0]),
             reflectance: self.range_within(&fields, "reflectance", Quantity::Ratio, reflectance, [0.0, 1.0]),
             roughness: self.range_within(&fields, "roughness", Quantity::Ratio, roughness, [0.001, 1.0]),
+            edge_break: self.range_within(&fields, "edge_break", Quantity::Length, EDGE_BREAK, [0.0, 10.0]),
             mottle: self.exact_or(&fields, "mottle", Quantity::Ratio, 0.0, [0.0, 1.0]),
             mottle_size: self.mottle_size(&fields),
             span: name.span,

@@ -219,6 +219,8 @@ pub struct Material {
     pub reflectance: Range,
     /// GGX alpha (metals, coat of plastics).
     pub roughness: Range,
+    /// Width (mm) of the rounding of convex edges on each of the two faces: no real edge is sharp.
+    pub edge_break: Range,
     /// Relative amplitude of the blotches on the surface (dirt, oxide, grain), 0 for none.
     pub mottle: f64,
     /// Size of the blotches in mm along x, y and z of the part's frame (unequal: grain).

@@ -7,6 +7,7 @@
 
 mod accel;
 mod bsdf;
+mod edge_break;
 mod lamp;
 mod mottle;
 pub mod sensor;
@@ -39,6 +40,8 @@ pub struct Settings {
     pub segments: u32,
     /// Render only these pixels: x0, y0, x1, y1 (px, x1 and y1 excluded), cut to the image.
     pub crop: Option<[u32; 4]>,
+    /// Render only the pixels that are true here, row by row of the whole image; the others stay black.
+    pub only: Option<Vec<bool>>,
     /// Greatest light that one path may bring by way of two or more surfaces, in units of the radiance of a white
     /// matt surface that faces the lamp from the middle of the scene. Dims what is brighter: `None` is exact.
     pub clamp: Option<f64>,
@@ -49,7 +52,15 @@ pub struct Settings {
 impl Default for Settings {
     /// For training images: 16 samples, 4 segments, bright specks held down.
     fn default() -> Self {
-        Settings { samples: 16, seed: 0, segments: 4, crop: None, clamp: Some(20.0), secondary_roughness: 0.15 }
+        Settings {
+            samples: 16,
+            seed: 0,
+            segments: 4,
+            crop: None,
+            only: None,
+            clamp: Some(20.0),
+            secondary_roughness: 0.15,
+        }
     }
 }
 
@@ -120,7 +131,12 @@ impl Film<'_> {
         let mut row = Vec::with_capacity(above.len() * self.groups);
         for (i, x) in (self.crop[0]..self.crop[2]).enumerate() {
             let corners = [above[i], above[i + 1], below[i], below[i + 1]];
-            row.extend(self.pixel(corners, u64::from(y) * u64::from(self.camera.size[0]) + u64::from(x)));
+            let number = u64::from(y) * u64::from(self.camera.size[0]) + u64::from(x);
+            if self.settings.only.as_ref().is_none_or(|only| only.get(number as usize).is_some_and(|&o| o)) {
+                row.extend(self.pixel(corners, number));
+            } else {
+                row.extend(std::iter::repeat_n(0.0, self.groups));
+            }
         }
         row
     }

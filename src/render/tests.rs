@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 fn finish(kind: MaterialKind, reflectance: f64, roughness: f64) -> Finish {
     let mottle_size = [5.0; 3];
-    Finish { kind, n: 0.0, k: 1.0, reflectance, roughness, mottle: 0.0, mottle_size, mottle_seed: 1 }
+    Finish { kind, n: 0.0, k: 1.0, reflectance, roughness, mottle: 0.0, mottle_size, mottle_seed: 1, edge_break: 0.0 }
 }
 
 fn ground(finish: Finish) -> Option<Ground> {

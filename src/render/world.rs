@@ -5,6 +5,7 @@
 
 use super::accel::{Accel, Corners, Ray};
 use super::bsdf::Bsdf;
+use super::edge_break::{Beyond, rounded, sides};
 use super::lamp::{FlatLamp, LampHit, Sky};
 use super::mottle::blotches;
 use super::vector::Vec3;
@@ -33,6 +34,8 @@ pub(super) struct World {
 
 struct Triangle {
     normals: [Vec3; 3],
+    /// Sides on a broken edge.
+    sides: [Option<Beyond>; 3],
     skin: u32,
 }
 
@@ -136,6 +139,8 @@ impl World {
         let position = a * weights[0] + b * weights[1] + c * weights[2];
         let [p, q, r] = triangle.normals;
         let smooth = (p * weights[0] + q * weights[1] + r * weights[2]).normalize();
+        let width = self.skins[triangle.skin as usize].edge_break;
+        let smooth = rounded(smooth, [a, b, c], weights, &triangle.sides, width);
         let shading = facing(smooth, geometric, ray.direction);
         let bsdf = self.skins[triangle.skin as usize].at(position);
         Encounter::Surface(Spot { position, geometric, shading, bsdf })
@@ -157,9 +162,10 @@ fn add_body(body: &Body, skin: u32, corners: &mut Vec<Corners>, triangles: &mut 
     let positions: Vec<[f32; 3]> =
         body.mesh.positions.iter().map(|p| (body.pose * p).coords.cast::<f32>().into()).collect();
     let rotation = body.pose.rotation.to_rotation_matrix();
-    for (indices, normals) in body.mesh.triangles.iter().zip(&body.mesh.normals) {
+    let sides = sides(&body.mesh, rotation.matrix());
+    for ((indices, normals), sides) in body.mesh.triangles.iter().zip(&body.mesh.normals).zip(sides) {
         corners.push(indices.map(|i| positions[i as usize]));
-        triangles.push(Triangle { normals: normals.map(|n| (rotation * n).cast()), skin });
+        triangles.push(Triangle { normals: normals.map(|n| (rotation * n).cast()), sides, skin });
     }
 }
 
@@ -196,6 +202,7 @@ struct Skin {
     k: f32,
     reflectance: f32,
     roughness: f32,
+    edge_break: f32,
     mottle: f32,
     /// Station frame to blotches: (p - origin) turned into the part's frame and divided by the blotch size.
     to_blotches: Matrix3<f32>,
@@ -218,6 +225,7 @@ impl Skin {
             k: finish.k as f32,
             reflectance: finish.reflectance as f32,
             roughness: finish.roughness as f32,
+            edge_break: finish.edge_break as f32,
             mottle: finish.mottle as f32,
             to_blotches: Matrix3::from_diagonal(&scale) * to_part,
             origin,

@@ -82,7 +82,9 @@ pub fn finish(material: &Material, seed: u64, image: u64, component: usize) -> F
     let mut stream = Stream::new(seed, &format!("finish of image {image}"), component as u64);
     let reflectance = log_uniform(&material.reflectance, stream.uniform());
     let roughness = log_uniform(&material.roughness, stream.uniform());
-    Finish { reflectance, roughness, mottle_seed: stream.bits(), ..finish_nominal(material) }
+    let mottle_seed = stream.bits();
+    let edge_break = log_uniform(&material.edge_break, stream.uniform());
+    Finish { reflectance, roughness, mottle_seed, edge_break, ..finish_nominal(material) }
 }
 
 /// The finish of a material with every number at its nominal value.
@@ -93,6 +95,7 @@ pub fn finish_nominal(material: &Material) -> Finish {
         k: material.k,
         reflectance: material.reflectance.nominal,
         roughness: material.roughness.nominal,
+        edge_break: material.edge_break.nominal,
         mottle: material.mottle,
         mottle_size: material.mottle_size,
         mottle_seed: 0,
@@ -255,6 +258,7 @@ mod tests {
             k: 4.1,
             reflectance: Range { low: 0.4, nominal: 0.6, high: 0.9 },
             roughness: Range { low: 0.05, nominal: 0.1, high: 0.2 },
+            edge_break: Range::exactly(0.0),
             mottle: 0.0,
             mottle_size: [1.0; 3],
             span: Span::default(),

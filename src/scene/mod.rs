@@ -17,6 +17,8 @@ pub struct Finish {
     pub k: f64,
     pub reflectance: f64,
     pub roughness: f64,
+    /// Width of the rounding of convex edges on each face (mm).
+    pub edge_break: f64,
     pub mottle: f64,
     pub mottle_size: [f64; 3],
     /// Which pattern of blotches this piece happens to have.

@@ -7,7 +7,7 @@ use crate::assembly::fault::{self, ErrorMode};
 use crate::assembly::place::place;
 use crate::design::model::{Design, Station};
 use crate::diag::Diagnostic;
-use crate::render::{self, Settings};
+use crate::render::{self, LightImages, Settings};
 use crate::rng::Stream;
 use crate::runtime::camera::Camera;
 use crate::runtime::grid::Grid;
@@ -16,11 +16,15 @@ use crate::scene::build::{self, FLOOR, Instance};
 use crate::scene::{Finish, Lamp};
 use crate::solid::{Quality, Solid, evaluate};
 use crate::variation;
+use crate::view::item_buffer::ItemBuffer;
+use crate::view::nodes::{change_mask, dilate};
 use nalgebra::Isometry3;
 use std::sync::Arc;
 
 /// Margin round the assembly's image (px of the shot).
 const MARGIN: f64 = 12.0;
+/// How far round a change its shade and mirror image are rendered anew (px of the shot).
+const NEAR: usize = 6;
 
 /// A draw of the assembly: pieces within tolerance, standing somewhere on the station.
 pub struct Drawn {
@@ -124,20 +128,75 @@ pub struct Setup<'a> {
     pub blur: f64,
 }
 
-/// Takes a shot; `seed` keys the renderer's own randomness.
-pub fn take(setup: &Setup, drawn: &Drawn, instance: &Instance, seed: u64) -> Shot {
+/// A correct shot before the lens blurs it, with what the camera sees: what faulty shots of the same draw are made from.
+pub struct Base {
+    images: LightImages,
+    seen: ItemBuffer,
+}
+
+/// Takes a shot of a correct assembly; `seed` keys the renderer's own randomness.
+pub fn take_good(setup: &Setup, drawn: &Drawn, seed: u64) -> (Shot, Base) {
+    let instance = drawn.instance(&[]);
+    let settings = settings(setup, drawn, &instance, seed);
+    let images = trace(setup, drawn, &instance, &settings);
+    let shot = develop(setup, drawn, &images);
+    (shot, Base { images, seen: see(setup, drawn, &instance) })
+}
+
+/// Takes a shot of a faulty assembly. Only what the fault changes, and what lies near enough to be shaded or mirrored by it,
+/// is rendered; the rest is the correct shot's.
+pub fn take_faulty(setup: &Setup, drawn: &Drawn, instance: &Instance, seed: u64, base: &Base) -> Shot {
+    let changed = dilate(&change_mask(&base.seen, &see(setup, drawn, instance)), NEAR);
+    let settings = Settings { only: Some(changed.bits), ..settings(setup, drawn, instance, seed) };
+    let mut images = trace(setup, drawn, instance, &settings);
+    let only = settings.only.unwrap_or_default();
+    overlay(&mut images, &base.images, &only);
+    develop(setup, drawn, &images)
+}
+
+fn settings(setup: &Setup, drawn: &Drawn, instance: &Instance, seed: u64) -> Settings {
+    let crop = crop(&setup.camera, instance, &drawn.standing);
+    Settings { samples: setup.samples, seed, crop: Some(crop), ..Settings::default() }
+}
+
+fn see(setup: &Setup, drawn: &Drawn, instance: &Instance) -> ItemBuffer {
+    ItemBuffer::of(&build::bodies(instance, drawn.standing.to_array()), &setup.camera)
+}
+
+fn trace(setup: &Setup, drawn: &Drawn, instance: &Instance, settings: &Settings) -> LightImages {
     let standing = drawn.standing.to_array();
     let scene = build::scene(setup.station, instance, standing, setup.lamps.clone(), drawn.ground.clone());
-    let crop = crop(&setup.camera, instance, &drawn.standing);
-    let settings = Settings { samples: setup.samples, seed, crop: Some(crop), ..Settings::default() };
-    let images = render::render(&scene, &setup.camera, &settings);
+    render::render(&scene, &setup.camera, settings)
+}
+
+/// Fills the pixels that were not rendered from another shot; beyond its crop its border goes on.
+fn overlay(images: &mut LightImages, base: &LightImages, only: &[bool]) {
+    let [x0, y0, x1, y1] = images.crop;
+    let [bx0, by0, bx1, by1] = base.crop;
+    let width = (bx1 - bx0) as usize;
+    for y in y0..y1 {
+        let row = (y.clamp(by0, by1 - 1) - by0) as usize * width;
+        for x in x0..x1 {
+            if !only[(y * images.width + x) as usize] {
+                let from = row + (x.clamp(bx0, bx1 - 1) - bx0) as usize;
+                let to = ((y - y0) * (x1 - x0) + x - x0) as usize;
+                for (group, good) in images.groups.iter_mut().zip(&base.groups) {
+                    group[to] = good[from];
+                }
+            }
+        }
+    }
+}
+
+/// Lens and frame: from rendered pixels to the full image.
+fn develop(setup: &Setup, drawn: &Drawn, images: &LightImages) -> Shot {
     let [width, height] = images.size().map(|s| s as usize);
-    let grid = |mut values: Vec<f32>| {
+    let grid = |group: &Vec<f32>| {
+        let mut values = group.clone();
         render::sensor::blur(&mut values, width, height, setup.blur as f32);
         framed(Grid::new(width, height, values), images.crop, setup.camera.size)
     };
-    let pose = drawn.standing;
-    Shot { pose, lamps: images.groups.iter().cloned().map(grid).collect() }
+    Shot { pose: drawn.standing, lamps: images.groups.iter().map(grid).collect() }
 }
 
 /// Pixels that hold the image of the instance, with a margin.

@@ -48,7 +48,8 @@ pub fn synthesise(
     for image in 0..u64::from(draws.count) {
         let drawn = shots::draw(design, setup.station, draws.seed, image)?;
         let mut noise = Stream::new(draws.seed, "render", image);
-        out.good.push(shots::take(setup, &drawn, &drawn.instance(&[]), noise.bits()));
+        let (good, base) = shots::take_good(setup, &drawn, noise.bits());
+        out.good.push(good);
         done();
         if image >= u64::from(draws.faulty) {
             continue;
@@ -56,7 +57,7 @@ pub fn synthesise(
         for (scene, taken) in plan.scenes.iter().zip(&mut out.faulty) {
             let sizes: Vec<[f64; 3]> = scene.iter().map(|&m| place_in_sweep(draws.seed, m, image)).collect();
             let faults: Vec<_> = scene.iter().map(|&m| &modes[m]).zip(sizes.iter().copied()).collect();
-            let shot = shots::take(setup, &drawn, &drawn.instance(&faults), noise.bits());
+            let shot = shots::take_faulty(setup, &drawn, &drawn.instance(&faults), noise.bits(), &base);
             taken.push(FaultyShot { shot, places: sizes.iter().map(|u| u[0]).collect() });
             done();
         }

@@ -51,6 +51,7 @@ pub fn body(component: usize, mesh: TriMesh, pose: Isometry3<f64>) -> Body {
         k: 0.0,
         reflectance: 0.5,
         roughness: 0.5,
+        edge_break: 0.0,
         mottle: 0.0,
         mottle_size: [1.0; 3],
         mottle_seed: 0,

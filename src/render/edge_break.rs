@@ -1,0 +1,123 @@
+//! Broken edges: no real edge is sharp, and its rounding catches light that neither face would send to the camera.
+//!
+//! In: a triangle mesh with its faces. Out: for every triangle the sides that lie on a convex edge between two faces, with
+//! the other face's normals; and the normal of the rounded surface near them. The silhouette stays sharp: a tenth of a
+//! millimetre is below a pixel, its glint is not.
+
+use super::vector::Vec3;
+use crate::solid::TriMesh;
+use nalgebra::Matrix3;
+use std::collections::BTreeMap;
+
+/// Faces that meet at a smaller angle than this (cosine) meet smoothly.
+const SMOOTH: f64 = 0.97;
+/// An edge is convex where the other face falls away from this one by more than this (sine).
+const FALLS_AWAY: f64 = 0.05;
+
+/// Normals of the face beyond a side, at the side's two ends.
+pub(super) type Beyond = [Vec3; 2];
+
+/// The convex sharp sides of each triangle; side k runs from corner k to the next.
+pub(super) fn sides(mesh: &TriMesh, rotation: &Matrix3<f64>) -> Vec<[Option<Beyond>; 3]> {
+    let mut owner: BTreeMap<(u32, u32), (usize, usize)> = BTreeMap::new();
+    for (index, triangle) in mesh.triangles.iter().enumerate() {
+        for side in 0..3 {
+            owner.insert((triangle[side], triangle[(side + 1) % 3]), (index, side));
+        }
+    }
+    let of = |index: usize, side: usize| {
+        let triangle = mesh.triangles[index];
+        let &(other, other_side) = owner.get(&(triangle[(side + 1) % 3], triangle[side]))?;
+        beyond(mesh, [index, side], [other, other_side]).map(|ends| ends.map(|n| (rotation * n).cast()))
+    };
+    (0..mesh.triangles.len()).map(|index| [0, 1, 2].map(|side| of(index, side))).collect()
+}
+
+fn beyond(
+    mesh: &TriMesh,
+    [index, side]: [usize; 2],
+    [other, other_side]: [usize; 2],
+) -> Option<[nalgebra::Vector3<f64>; 2]> {
+    if mesh.faces[index] == mesh.faces[other] {
+        return None;
+    }
+    // The neighbour walks the side the other way.
+    let ends = [mesh.normals[other][(other_side + 1) % 3], mesh.normals[other][other_side]];
+    let own = mesh.normals[index][side];
+    let [a, _, c] = [0, 1, 2].map(|k| mesh.positions[mesh.triangles[index][(side + k) % 3] as usize]);
+    let inward = c - a;
+    let convex = ends[0].dot(&inward) < -FALLS_AWAY * inward.norm();
+    (convex && own.dot(&ends[0]) < SMOOTH).then_some(ends)
+}
+
+/// The normal of the rounded surface at a point with barycentric `weights` of a triangle. `width` (mm) is how far the
+/// rounding reaches into the face; at the edge itself the normal is midway between the two faces.
+pub(super) fn rounded(
+    smooth: Vec3,
+    corners: [Vec3; 3],
+    weights: [f32; 3],
+    sides: &[Option<Beyond>; 3],
+    width: f32,
+) -> Vec3 {
+    let mut normal = smooth;
+    let double_area = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
+    for (side, beyond) in sides.iter().enumerate() {
+        let Some([from, to]) = beyond else { continue };
+        let (a, b) = (corners[side], corners[(side + 1) % 3]);
+        let length = (b - a).norm();
+        let distance = weights[(side + 2) % 3] * double_area / length;
+        if distance < width {
+            let along = weights[(side + 1) % 3] / (weights[side] + weights[(side + 1) % 3]).max(1e-6);
+            let other = from.lerp(to, along);
+            normal = normal.lerp(&other, 0.5 * (1.0 - distance / width)).normalize();
+        }
+    }
+    normal
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Point3, Vector3};
+
+    /// The top (+z) and the side (+x) of a box that meet along y, and a step up from the top.
+    fn corner() -> TriMesh {
+        let p = |x: f64, y: f64, z: f64| Point3::new(x, y, z);
+        let (z, x) = (Vector3::z(), Vector3::x());
+        TriMesh {
+            positions: vec![
+                p(0., 0., 0.),
+                p(0., 4., 0.),
+                p(-4., 0., 0.),
+                p(0., 0., -4.),
+                p(-4., 4., 0.),
+                p(-4., 4., 4.),
+            ],
+            triangles: vec![[0, 1, 2], [1, 0, 3], [4, 2, 1], [2, 4, 5]],
+            normals: vec![[z; 3], [x; 3], [z; 3], [x; 3]],
+            faces: vec![0, 1, 0, 2],
+        }
+    }
+
+    #[test]
+    fn only_convex_edges_between_faces_are_broken() {
+        let sides = sides(&corner(), &Matrix3::identity());
+        assert!(sides[0][0].is_some() && sides[1][0].is_some());
+        assert!(sides[0][1].is_none(), "inside the top");
+        assert!(sides[2].iter().all(Option::is_none), "the foot of the step is a corner, not an edge");
+    }
+
+    #[test]
+    fn the_normal_turns_from_one_face_to_halfway() {
+        let mesh = corner();
+        let sides = sides(&mesh, &Matrix3::identity());
+        let corners = mesh.triangles[0].map(|i| mesh.positions[i as usize].coords.cast());
+        let at = |distance: f32| {
+            let c = distance / 4.0;
+            rounded(Vec3::z(), corners, [0.5 - c / 2.0, 0.5 - c / 2.0, c], &sides[0], 0.5)
+        };
+        assert!((at(0.0).angle(&Vec3::z()) - std::f32::consts::FRAC_PI_4).abs() < 1e-3);
+        assert!(at(0.25).x > 0.1 && at(0.25).x < at(0.1).x);
+        assert_eq!(at(0.6), Vec3::z());
+    }
+}
