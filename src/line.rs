@@ -152,7 +152,7 @@ impl<'a> Line<'a> {
         self.emit(Artifact::Liaison, || artifacts::liaison(design, solids, analysis));
         self.emit(Artifact::ErrorTrees, || artifacts::error_trees(design, trees));
         self.emit(Artifact::ObjectTree, || artifacts::object_tree(design, trees));
-        self.emit(Artifact::Insertion, || artifacts::insertion(design, analysis));
+        self.emit(Artifact::Insertion, || artifacts::insertion(design, solids, analysis));
     }
 
     pub fn emit_images(&mut self, pictures: impl FnOnce() -> Vec<(String, Vec<u8>)>) {

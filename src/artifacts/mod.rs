@@ -8,8 +8,9 @@ pub mod images;
 use crate::assembly::Analysis;
 use crate::assembly::contact::{Contact, FaceRef};
 use crate::assembly::error_tree::{self, ErrorTree};
+use crate::assembly::place::place;
 use crate::assembly::{insertion, liaison};
-use crate::design::model::{Design, Feature, LightShape, Part, Station};
+use crate::design::model::{Component, Design, Dimension, Feature, LightShape, Op, Part, Shape, Station, Train};
 use crate::line::Stage;
 use crate::runtime::camera::Camera;
 use crate::runtime::model::{Hypothesis, Model, Node};
@@ -17,6 +18,7 @@ use crate::solid::{Solid, Surface};
 use crate::units::{Quantity, Range};
 use crate::view::choose::Choice;
 use crate::view::item_buffer::PixelBox;
+use nalgebra::Vector3;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 use std::sync::Arc;
@@ -132,14 +134,14 @@ struct DesignSummary<'a> {
     stations: Named<StationSummary<'a>>,
     watch: Vec<(&'a str, Option<u32>)>,
     false_reject: f64,
-    train: &'a crate::design::model::Train,
+    train: &'a Train,
 }
 
 #[derive(Serialize)]
 struct PartSummary<'a> {
     material: &'a str,
     /// Operation, shape, number of copies.
-    features: Named<(crate::design::model::Op, &'static str, usize)>,
+    features: Named<(Op, &'static str, usize)>,
 }
 
 #[derive(Serialize)]
@@ -165,7 +167,7 @@ pub fn design(design: &Design) -> String {
     format!("// dimensions: (low, nominal, high, MMC, LMC) in mm and degrees\n{}", ron(2, &summary))
 }
 
-fn limits(dim: &crate::design::model::Dimension) -> [f64; 5] {
+fn limits(dim: &Dimension) -> [f64; 5] {
     let unit = |v: f64| if dim.quantity == Quantity::Angle { v.to_degrees() } else { v };
     let Range { low, nominal, high } = dim.range;
     [low, nominal, high, dim.mmc, dim.lmc].map(|v| rounded(unit(v), 5))
@@ -180,7 +182,6 @@ fn part<'a>(design: &'a Design, part: &'a Part) -> PartSummary<'a> {
 }
 
 fn shape(feature: &Feature) -> &'static str {
-    use crate::design::model::Shape;
     match feature.copies.first().map(|c| &c.shape) {
         Some(Shape::Box { .. }) => "box",
         Some(Shape::Cylinder { .. }) => "cylinder",
@@ -192,7 +193,7 @@ fn shape(feature: &Feature) -> &'static str {
 
 type ComponentSummary<'a> = (&'a str, Option<&'a str>, [f64; 6]);
 
-fn component<'a>(design: &'a Design, component: &'a crate::design::model::Component) -> (String, ComponentSummary<'a>) {
+fn component<'a>(design: &'a Design, component: &'a Component) -> (String, ComponentSummary<'a>) {
     let values = design.nominal();
     let pose = component.frame.eval(&values) * component.pose.eval(&values);
     let (rx, ry, rz) = pose.rotation.euler_angles();
@@ -299,8 +300,21 @@ pub fn object_tree(design: &Design, trees: &[ErrorTree]) -> String {
     ron(2, &Named(vec![(design.name.clone(), Named(trees))]))
 }
 
-pub fn insertion(design: &Design, analysis: &Analysis) -> String {
-    ron(2, &insertion::summary(design, &analysis.insertion))
+#[derive(Serialize)]
+struct InsertionOutput {
+    removal: insertion::InsertionSummary,
+    /// How far each component moves in the exploded view (mm).
+    exploded: Named<[f64; 3]>,
+}
+
+pub fn insertion(design: &Design, solids: &[Arc<Solid>], analysis: &Analysis) -> String {
+    let poses = place(design, &design.nominal());
+    let shifts = insertion::exploded(&analysis.insertion, solids, &poses);
+    let shift = |(component, by): (&Component, &Vector3<f64>)| {
+        (component.name.clone(), [by.x, by.y, by.z].map(|v| rounded(v, 3)))
+    };
+    let exploded = Named(design.components.iter().zip(&shifts).map(shift).collect());
+    ron(3, &InsertionOutput { removal: insertion::summary(design, &analysis.insertion), exploded })
 }
 
 // --- The view --------------------------------------------------------------------------------------------------------
