@@ -23,6 +23,10 @@ const EXPOSURES: [f64; 2] = [0.35, 0.75];
 /// Share of the held-out goods' lowest locator score below which an assembly counts as not found.
 const ACCEPT_SHARE: f64 = 0.5;
 
+/// Share of the lowest goods and the highest faults left out when asking whether they overlap: photos in which the pose
+/// went wrong, which say nothing about the node.
+const TRIM: f64 = 0.1;
+
 /// A station as some customer might have it.
 pub struct Customer {
     pub installation: Installation,
@@ -123,19 +127,24 @@ fn scores(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], 
     }
 }
 
-/// The log-likelihood ratio below which a node counts as faulty. The sign decides, or midway between the extremes where
-/// they lie apart but below zero. Where good and faulty renders overlap, no threshold is right: the promised rate of false
-/// rejects is kept by the goods' own mean and spread, and what escapes is counted. Never a quantile of the goods: its
-/// few lowest scores say nothing about the photo's.
+/// The log-likelihood ratio below which a node counts as faulty: its sign decides. Where the bulk of good and faulty renders
+/// overlap, the sign says nothing, and the promised rate of false rejects is kept by the middle and the spread of the goods;
+/// what escapes is counted. Never a quantile of the goods: their few lowest scores say nothing about a photo's.
 fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
-    let (Some(lowest), Some(highest)) = (good.first(), fault.last()) else { return 0.0 };
-    if lowest > highest {
-        return ((lowest + highest) / 2.0).min(0.0);
+    if good.is_empty() || fault.is_empty() || at_share(good, TRIM) > at_share(fault, 1.0 - TRIM) {
+        return 0.0;
     }
-    let n = good.len() as f64;
-    let mean = good.iter().sum::<f64>() / n;
-    let deviation = (good.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt();
-    (mean - normal_quantile(1.0 - false_reject) * deviation).min(0.0)
+    let middle = at_share(good, 0.5);
+    let mut distances: Vec<f64> = good.iter().map(|g| (g - middle).abs()).collect();
+    distances.sort_by(f64::total_cmp);
+    // The median distance of a normal variable from its mean is 0.6745 standard deviations.
+    let deviation = at_share(&distances, 0.5) / 0.6745;
+    (middle - normal_quantile(1.0 - false_reject) * deviation).min(0.0)
+}
+
+/// The value below which a share of ascending values lies.
+fn at_share(sorted: &[f64], share: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * share).round() as usize]
 }
 
 fn accept(judged: &[Judged]) -> f64 {
@@ -177,5 +186,25 @@ fn promise(
         false_reject: rate(false_rejects as u32, (goods.len() + unfit) as u32),
         escape: rate(escapes, trials),
         modes: rates,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sign_decides_where_renders_lie_apart() {
+        let good = [-0.3, 0.2, 0.25, 0.3, 0.3, 0.35, 0.4, 0.4, 0.45, 0.5, 0.6];
+        let fault = [-0.9, -0.8, -0.8, -0.7, -0.6, -0.5, -0.5, -0.4, -0.3, -0.2, 0.1];
+        assert_eq!(threshold(&good, &fault, 1e-3), 0.0);
+    }
+
+    #[test]
+    fn where_they_overlap_the_false_rejects_are_kept() {
+        let good = [-0.1, -0.05, 0.0, 0.05, 0.1];
+        let fault = [-0.2, -0.1, 0.0, 0.1];
+        let expected = -3.0902 * 0.05 / 0.6745;
+        assert!((threshold(&good, &fault, 1e-3) - expected).abs() < 1e-3);
     }
 }
