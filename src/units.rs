@@ -37,6 +37,13 @@ impl Range {
         Range { low: nominal - deviation, nominal, high: nominal + deviation }
     }
 
+    /// The limits of a size called `basic` on the drawing. Where both deviations lie on one side of it (a shaft 6 g6 is
+    /// never 6 mm), what the shop aims at is the middle of the limits.
+    pub fn about(basic: f64, low: f64, high: f64) -> Self {
+        let nominal = if (low..=high).contains(&basic) { basic } else { (low + high) / 2.0 };
+        Range { low, nominal, high }
+    }
+
     /// Half the width of the range.
     pub fn half_width(&self) -> f64 {
         (self.high - self.low) / 2.0

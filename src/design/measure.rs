@@ -160,7 +160,7 @@ impl Resolver {
                     self.reversed(dim.span, &upper.text, &lower.text);
                     return None;
                 }
-                limited(Range { low: nominal + low, nominal, high: nominal + high })
+                limited(Range::about(nominal, nominal + low, nominal + high))
             }
             Tolerance::Limits(q) => {
                 let own = match &dim.size {
@@ -201,7 +201,7 @@ impl Resolver {
                 return None;
             }
         };
-        let range = Range { low: nominal + low, nominal, high: nominal + high };
+        let range = Range::about(nominal, nominal + low, nominal + high);
         let remark = Remark { states: None, fit: Some((class.text.clone(), class.span)) };
         Some(Limited { range, quantity: Some(Quantity::Length), remark })
     }

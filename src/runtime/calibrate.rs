@@ -182,8 +182,9 @@ fn install(
     Ok((installation, poses, score))
 }
 
-/// The standing ranges, widened by what an installation error looks like on the plate.
-fn widened(model: &Model) -> [[f64; 2]; 4] {
+/// The standing ranges, widened by what an installation error looks like on the plate. One photo cannot tell a turned camera
+/// from a shifted assembly, so calibration leaves part of the one in the other and judging needs the margin too.
+pub(super) fn widened(model: &Model) -> [[f64; 2]; 4] {
     let station = &model.station;
     let distance = station.camera.position.iter().map(|v| v * v).sum::<f64>().sqrt();
     let length = station.install.position_mm + station.install.angle_rad * distance;

@@ -4,7 +4,7 @@
 //! The assembly is located first; then every node of the object tree weighs the good state against each error mode, and the
 //! tree explains away what one fault does to its neighbours. Trouble never looks like go.
 
-use super::calibrate::Calibration;
+use super::calibrate::{Calibration, widened};
 use super::camera::Camera;
 use super::density::Density;
 use super::judge::{Evidence, Prepared, fit_lamps};
@@ -112,7 +112,7 @@ impl<'a> Inspector<'a> {
     /// Judges one photo.
     pub fn inspect(&self, photo: &Photo) -> Verdict {
         let fields = self.search.fields(&photo.light, self.calibration.noise);
-        let located = self.search.locate(&fields, &self.camera, &self.model.station.standing);
+        let located = self.search.locate(&fields, &self.camera, &widened(self.model));
         let least = self.model.locator.accept.max(LEAST_SCORE * self.calibration.score);
         match located {
             Some(found) if found.score >= least => self.judge(photo, found),
