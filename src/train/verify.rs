@@ -128,7 +128,7 @@ fn scores(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], 
 }
 
 /// The log-likelihood ratio below which a node counts as faulty: its sign decides or, where good and faulty renders lie apart
-/// but on one side of zero, the middle between them. Where their bulk overlaps, no threshold is right: the promised rate
+/// but below zero, the middle between them; what is more likely good is never rejected. Where their bulk overlaps, no threshold is right: the promised rate
 /// of false rejects is kept by the middle and the spread of the goods, and what escapes is counted. Never a quantile of
 /// the goods: their few lowest scores say nothing about a photo's.
 fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
@@ -137,8 +137,7 @@ fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
     }
     let (lowest, highest) = (at_share(good, TRIM), at_share(fault, 1.0 - TRIM));
     if lowest > highest {
-        let sign_decides = lowest > 0.0 && highest < 0.0;
-        return if sign_decides { 0.0 } else { (lowest + highest) / 2.0 };
+        return if lowest > 0.0 { 0.0 } else { (lowest + highest) / 2.0 };
     }
     let middle = at_share(good, 0.5);
     let mut distances: Vec<f64> = good.iter().map(|g| (g - middle).abs()).collect();
@@ -207,8 +206,9 @@ mod tests {
     }
 
     #[test]
-    fn the_middle_decides_where_they_lie_apart_on_one_side_of_zero() {
+    fn the_middle_decides_where_they_lie_apart_below_zero() {
         assert!((threshold(&[-0.2, -0.1, 0.0], &[-0.8, -0.7, -0.6], 1e-3) + 0.4).abs() < 1e-9);
+        assert_eq!(threshold(&[0.3, 0.4], &[0.1, 0.2], 1e-3), 0.0);
     }
 
     #[test]
