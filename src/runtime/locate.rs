@@ -1,8 +1,8 @@
 //! Where the assembly stands in a photo: a search over the pose on the plate, carried through the camera.
 //!
 //! In: orientation fields of the photo, edge points with 3-D positions. Out: a pose with its score. Coarse: all poses of
-//! a grid, scored by the mean agreement of edge orientations, polarity kept (Steger 2002; the exhaustive first level of
-//! the paper's search). Fine: the best few follow their edges to sub-pixel accuracy by robust least squares. Never
+//! a grid, scored by the mean agreement of edge orientations (Steger 2002; the exhaustive first level of the paper's search),
+//! polarity kept unless the model says that the light decides it. Fine: the best few follow their edges to sub-pixel accuracy by robust least squares. Never
 //! judges a component.
 
 use super::camera::{Camera, Vec3, sub};
@@ -31,16 +31,30 @@ const LEAST_AGREEMENT: f32 = 0.5;
 pub struct Field {
     width: usize,
     height: usize,
-    /// Gradient at pixel corners, divided by its length plus the noise level.
+    /// Gradient at pixel corners, divided by its length plus the noise level; of unsigned edges at twice its angle.
     orientation: Vec<[f32; 2]>,
     /// The gradient itself.
     gradient: Vec<[f32; 2]>,
+    unsigned: bool,
+}
+
+/// A vector of the same length at twice the angle: the same for both polarities of an edge.
+pub fn doubled([x, y]: [f32; 2]) -> [f32; 2] {
+    let length = x.hypot(y).max(f32::MIN_POSITIVE);
+    [(x * x - y * y) / length, 2.0 * x * y / length]
+}
+
+/// A vector of the same length at half the angle.
+pub fn halved([x, y]: [f32; 2]) -> [f32; 2] {
+    let (sin, cos) = (y.atan2(x) / 2.0).sin_cos();
+    let length = x.hypot(y);
+    [length * cos, length * sin]
 }
 
 impl Field {
     /// Orientations of `grid`, whose noise has standard deviation `noise`; `smooth` averages orientations over 3 x 3 px so
-    /// that a coarse grid of poses cannot step over an edge.
-    pub fn new(grid: &Grid, noise: f64, smooth: bool) -> Field {
+    /// that a coarse grid of poses cannot step over an edge; of `unsigned` edges only the line counts, not its sign.
+    pub fn new(grid: &Grid, noise: f64, smooth: bool, unsigned: bool) -> Field {
         let (width, height) = (grid.width + 1, grid.height + 1);
         let integral = Integral::new(grid);
         let floor = (3.0 * noise / 2.0).max(1e-6) as f32;
@@ -52,13 +66,14 @@ impl Field {
         }
         let unit = |g: &[f32; 2]| {
             let length = (g[0] * g[0] + g[1] * g[1]).sqrt() + floor;
-            [g[0] / length, g[1] / length]
+            let unit = [g[0] / length, g[1] / length];
+            if unsigned { doubled(unit) } else { unit }
         };
         let mut orientation: Vec<[f32; 2]> = gradient.iter().map(unit).collect();
         if smooth {
             orientation = smoothed(&orientation, width, height);
         }
-        Field { width, height, orientation, gradient }
+        Field { width, height, orientation, gradient, unsigned }
     }
 
     /// Agreement of a unit direction with the orientation at a point (field px); 0 outside the image.
@@ -68,6 +83,7 @@ impl Field {
             return 0.0;
         }
         let o = self.orientation[y as usize * self.width + x as usize];
+        let direction = if self.unsigned { doubled(direction) } else { direction };
         o[0] * direction[0] + o[1] * direction[1]
     }
 
@@ -78,7 +94,7 @@ impl Field {
         inside.then(|| self.gradient[y as usize * self.width + x as usize])
     }
 
-    /// Gradient across an edge, bilinear; `None` outside.
+    /// Gradient across an edge, bilinear, without its sign where edges have none; `None` outside.
     fn slope(&self, at: [f64; 2], direction: [f32; 2]) -> Option<f32> {
         let (x, y) = (at[0], at[1]);
         if !(x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64) {
@@ -93,7 +109,8 @@ impl Field {
         let k = j * self.width + i;
         let top = across(k) + (across(k + 1) - across(k)) * fx;
         let bottom = across(k + self.width) + (across(k + self.width + 1) - across(k + self.width)) * fx;
-        Some(top + (bottom - top) * fy)
+        let slope = top + (bottom - top) * fy;
+        Some(if self.unsigned { slope.abs() } else { slope })
     }
 }
 
@@ -147,6 +164,7 @@ impl EdgePoint {
 pub struct Search {
     coarse_factor: u32,
     fine_factor: u32,
+    unsigned: bool,
     groups: Vec<Vec<Alternative>>,
 }
 
@@ -178,14 +196,16 @@ impl Search {
         Search {
             coarse_factor: locator.coarse,
             fine_factor: locator.fine,
+            unsigned: locator.unsigned,
             groups: locator.groups.iter().map(group).collect(),
         }
     }
 
     /// Orientation fields of a photo whose pixels have noise `noise`.
     pub fn fields(&self, photo: &Grid, noise: f64) -> Fields {
-        let field =
-            |factor: u32, smooth| Field::new(&photo.reduced(factor as usize), noise / f64::from(factor), smooth);
+        let field = |factor: u32, smooth| {
+            Field::new(&photo.reduced(factor as usize), noise / f64::from(factor), smooth, self.unsigned)
+        };
         Fields { coarse: field(self.coarse_factor, true), fine: field(self.fine_factor, false) }
     }
 
@@ -284,32 +304,20 @@ impl Search {
 
     /// Mean agreement of the fine points at a pose; groups count by their number of points.
     pub fn score(&self, field: &Field, camera: &Camera, pose: &Pose) -> f64 {
-        let mean = |alternative: &Alternative| {
-            let sum: f64 = alternative
-                .fine
-                .iter()
-                .filter_map(|p| p.seen(camera, pose))
-                .map(|(at, direction)| f64::from(field.agreement(at, direction)))
-                .sum();
-            sum / alternative.fine.len().max(1) as f64
+        let group = |alternatives: &Vec<Alternative>| {
+            let agreement = |a: &Alternative| (agreement(field, camera, pose, a), a.fine.len());
+            best_of(alternatives.iter().map(agreement))
         };
-        let (mut total, mut weight) = (0.0, 0.0);
-        for group in self.groups.iter().filter(|g| g.iter().any(|a| !a.fine.is_empty())) {
-            let points = group.iter().map(|a| a.fine.len()).max().unwrap_or(0) as f64;
-            total += points * group.iter().map(mean).fold(f64::NEG_INFINITY, f64::max);
-            weight += points;
-        }
-        if weight == 0.0 { 0.0 } else { total / weight }
+        let points = |group: &Vec<Alternative>| group.iter().map(|a| a.fine.len()).max().unwrap_or(0);
+        let weight: usize = self.groups.iter().map(points).sum();
+        self.groups.iter().map(group).sum::<f64>() / weight.max(1) as f64
     }
 
     /// The fine points of the alternatives that fit best at a pose.
     fn chosen(&self, field: &Field, camera: &Camera, pose: &Pose) -> Vec<EdgePoint> {
-        let agreement = |a: &Alternative| {
-            let seen = a.fine.iter().filter_map(|p| p.seen(camera, pose));
-            seen.map(|(at, d)| field.agreement(at, d)).sum::<f32>() / a.fine.len().max(1) as f32
-        };
+        let clear = |a: &Alternative| agreement(field, camera, pose, a) / (a.fine.len().max(1) as f64).sqrt();
         let best = |group: &Vec<Alternative>| {
-            let scored = group.iter().map(|a| (agreement(a), a));
+            let scored = group.iter().map(|a| (clear(a), a));
             scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, a)| a.fine.clone()).unwrap_or_default()
         };
         self.groups.iter().flat_map(best).collect()
@@ -393,24 +401,34 @@ struct SheetPoint {
 }
 
 impl Sheet {
-    /// Sum over groups of the best alternative's mean agreement, weighted by its number of points.
+    /// Sum over groups of the best alternative's agreement.
     fn score(&self, field: &Field, dx: f64, dy: f64) -> f64 {
-        let mean = |points: &Vec<SheetPoint>| {
-            let sum: f32 = points
-                .iter()
-                .map(|p| {
-                    let at = [0, 1].map(|i| p.at[i] + dx * p.per_x[i] + dy * p.per_y[i]);
-                    field.agreement(at, p.direction)
-                })
-                .sum();
-            f64::from(sum) / points.len().max(1) as f64
+        let sum = |points: &Vec<SheetPoint>| {
+            let agreement = |p: &SheetPoint| {
+                field.agreement([0, 1].map(|i| p.at[i] + dx * p.per_x[i] + dy * p.per_y[i]), p.direction)
+            };
+            (f64::from(points.iter().map(agreement).sum::<f32>()), points.len())
         };
-        let group = |alternatives: &Vec<Vec<SheetPoint>>| {
-            let points = alternatives.iter().map(Vec::len).max().unwrap_or(0) as f64;
-            points * alternatives.iter().map(mean).fold(f64::NEG_INFINITY, f64::max)
-        };
-        self.groups.iter().filter(|g| g.iter().any(|a| !a.is_empty())).map(group).sum()
+        self.groups.iter().map(|alternatives| best_of(alternatives.iter().map(sum))).sum()
     }
+}
+
+/// Sum of the agreements of an alternative's fine points.
+fn agreement(field: &Field, camera: &Camera, pose: &Pose, alternative: &Alternative) -> f64 {
+    let seen = alternative.fine.iter().filter_map(|p| p.seen(camera, pose));
+    seen.map(|(at, direction)| f64::from(field.agreement(at, direction))).sum()
+}
+
+/// The clearest of some sums of agreements, each with its number of points. By chance a sum of n agreements grows with
+/// √n and their mean falls with it, so alternatives of unlike size are compared in standard deviations, in the measure of
+/// the largest.
+fn best_of(sums: impl Iterator<Item = (f64, usize)>) -> f64 {
+    let (mut clearest, mut most) = (f64::NEG_INFINITY, 0);
+    for (sum, points) in sums.filter(|(_, points)| *points > 0) {
+        clearest = clearest.max(sum / (points as f64).sqrt());
+        most = most.max(points);
+    }
+    if most == 0 { 0.0 } else { clearest * (most as f64).sqrt() }
 }
 
 /// One edge point's wish: how far the image of the point should move along its normal, how that motion depends on the
@@ -554,7 +572,7 @@ mod tests {
         let camera = Camera::look_at([0.0, -60.0, 150.0], [0.0; 3], 700.0, [240, 200]);
         let points = PointSet { fault: "good".into(), coarse: outline(), fine: outline() };
         let groups = vec![PointGroup { name: "square".into(), alternatives: vec![points] }];
-        (camera, Search::new(&Locator { coarse: 4, fine: 2, groups, accept: 0.0 }))
+        (camera, Search::new(&Locator { coarse: 4, fine: 2, unsigned: false, groups, accept: 0.0 }))
     }
 
     use crate::runtime::model::PointSet;

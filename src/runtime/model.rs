@@ -108,6 +108,9 @@ pub struct Locator {
     /// px of the photo per px of the coarse and of the fine search.
     pub coarse: u32,
     pub fine: u32,
+    /// Edges count whichever of their sides is the brighter: where the light decides that, an edge has a place but no sign.
+    #[serde(default)]
+    pub unsigned: bool,
     /// Each group contributes the best of its alternatives.
     pub groups: Vec<PointGroup>,
     /// Below this score the assembly counts as not found.
@@ -407,6 +410,7 @@ pub(crate) mod tests {
             },
             promise: Promise { false_reject_asked: 0.01, false_reject: rate, escape: rate, modes: vec![] },
             locator: Locator {
+                unsigned: false,
                 coarse: 2,
                 fine: 1,
                 groups: vec![PointGroup { name: "datum".into(), alternatives: vec![points] }],

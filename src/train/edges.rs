@@ -8,11 +8,13 @@ use super::shots::Shot;
 use crate::rng::Stream;
 use crate::runtime::camera::{Camera, Vec3, normalise, sub};
 use crate::runtime::grid::Grid;
-use crate::runtime::locate::{EdgePoint, Field};
+use crate::runtime::locate::{EdgePoint, Field, doubled, halved};
 use crate::runtime::pose::Pose;
 
 /// Mean orientation over the draws (0..1) that a point must reach.
 const LEAST_AGREEMENT: f32 = 0.65;
+/// The same for unsigned edges: the light takes the contrast away now and then, which moves no edge.
+const LEAST_UNSIGNED: f32 = 0.4;
 /// Noise level under which orientations fade, share of full scale.
 const NOISE: f64 = 0.01;
 
@@ -31,6 +33,8 @@ pub struct Ground<'a> {
     /// Nominal lamp powers.
     pub powers: &'a [f64],
     pub seed: u64,
+    /// Look for edges whose place is sure even if the light decides which of their sides is the brighter.
+    pub unsigned: bool,
 }
 
 /// At most `count` points, evenly thinned.
@@ -46,10 +50,11 @@ pub fn find(ground: &Ground, surface: &Surface, count: usize) -> Vec<EdgePoint> 
             let Some(point) = surface(x, y) else { continue };
             let index = y * (width + 1) + x;
             points[index] = Some(point);
-            mean[index] = mean_orientation(&fields, &camera, &ground.home, point, [x as f64, y as f64]);
+            mean[index] = mean_orientation(ground, &fields, &camera, point, [x as f64, y as f64]);
         }
     }
-    let candidates = peaks(&mean, &points, width + 1, height + 1);
+    let least = if ground.unsigned { LEAST_UNSIGNED } else { LEAST_AGREEMENT };
+    let candidates = peaks(&mean, &points, least, width + 1, height + 1);
     let thinned = thin(candidates, count);
     let point = |(x, y): &(usize, usize)| {
         let index = y * (width + 1) + x;
@@ -64,13 +69,19 @@ fn field(ground: &Ground, shot: &Shot, index: usize) -> Field {
     // From a fifth to twice the described power: a description is a prior only.
     let weights: Vec<f64> = ground.powers.iter().map(|p| p * stream.between(0.2f64.ln(), 2f64.ln()).exp()).collect();
     let light = shot.lit(&weights).reduced((ground.factor / ground.base) as usize);
-    Field::new(&light, NOISE, false)
+    Field::new(&light, NOISE, false, false)
 }
 
 /// Mean over the shots of the unit gradient at the image of `point`, brought back to the nominal image: a gradient is a
 /// covector, so it transforms with the transposed Jacobian.
-fn mean_orientation(fields: &[(Field, &Pose)], camera: &Camera, home: &Pose, point: Vec3, at: [f64; 2]) -> [f32; 2] {
-    let Some(steps) = steps_in_space(camera, home, point, at) else { return [0.0; 2] };
+fn mean_orientation(
+    ground: &Ground,
+    fields: &[(Field, &Pose)],
+    camera: &Camera,
+    point: Vec3,
+    at: [f64; 2],
+) -> [f32; 2] {
+    let Some(steps) = steps_in_space(camera, &ground.home, point, at) else { return [0.0; 2] };
     let mut sum = [0.0f32; 2];
     for (field, pose) in fields {
         let Some(p) = camera.project(pose.apply(point)) else { continue };
@@ -82,9 +93,12 @@ fn mean_orientation(fields: &[(Field, &Pose)], camera: &Camera, home: &Pose, poi
         }
         let length = (back[0] * back[0] + back[1] * back[1]).sqrt();
         let strength = length + (3.0 * NOISE / 2.0) as f32;
-        sum = [sum[0] + back[0] / strength, sum[1] + back[1] / strength];
+        let unit = back.map(|b| b / strength);
+        let unit = if ground.unsigned { doubled(unit) } else { unit };
+        sum = [sum[0] + unit[0], sum[1] + unit[1]];
     }
-    sum.map(|s| s / fields.len().max(1) as f32)
+    let mean = sum.map(|s| s / fields.len().max(1) as f32);
+    if ground.unsigned { halved(mean) } else { mean }
 }
 
 /// The points of the assembly one px to the right of and below `at`, on the horizontal plane through `point`.
@@ -101,14 +115,14 @@ fn steps_in_space(camera: &Camera, home: &Pose, point: Vec3, at: [f64; 2]) -> Op
 }
 
 /// Local maxima across the edge of the mean orientation's length.
-fn peaks(mean: &[[f32; 2]], points: &[Option<Vec3>], width: usize, height: usize) -> Vec<(usize, usize)> {
+fn peaks(mean: &[[f32; 2]], points: &[Option<Vec3>], least: f32, width: usize, height: usize) -> Vec<(usize, usize)> {
     let length = |i: usize| (mean[i][0] * mean[i][0] + mean[i][1] * mean[i][1]).sqrt();
     let mut out = Vec::new();
     for y in 1..height - 1 {
         for x in 1..width - 1 {
             let i = y * width + x;
             let here = length(i);
-            if points[i].is_none() || here < LEAST_AGREEMENT {
+            if points[i].is_none() || here < least {
                 continue;
             }
             let horizontal = mean[i][0].abs() > mean[i][1].abs();

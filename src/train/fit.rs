@@ -13,6 +13,8 @@ use crate::runtime::locate::EdgePoint;
 use crate::runtime::model::{Hypothesis, Image, Locator, Node, PointGroup, PointSet};
 use crate::runtime::pose::Pose;
 use crate::runtime::window::{Window, runs_of};
+use crate::view::item_buffer::Mask;
+use crate::view::nodes::dilate;
 
 /// Quantisation: the ninth decile of a lamp's image has this many steps.
 const STEPS_AT_NINTH_DECILE: f64 = 400.0;
@@ -25,6 +27,8 @@ const FINE_POINTS: usize = 900;
 const COARSE_POINTS: usize = 300;
 /// With fewer datum points than this the watched components help to locate.
 const ENOUGH_DATUM_POINTS: usize = 150;
+/// A component's outline lies within this much of its own change (px of the shots).
+const OUTLINE: usize = 2;
 /// Noise assumed while aligning, share of full scale.
 const ALIGN_NOISE: f64 = 0.01;
 
@@ -189,45 +193,61 @@ fn quantised(draws: &[Vec<Grid>], steps: &[f64]) -> Vec<Image> {
     out
 }
 
-/// The locator: points on components that no modelled fault carries away; where those show too few edges, the watched
-/// components' own, in every state.
+/// The locator: points on components that no modelled fault carries away. Where those show too few edges, the watched
+/// components' own in every state, and of those the light may decide which side is the brighter: a bare part is darker
+/// than its ground in one room and brighter in the next.
 pub fn locator(context: &Context, datum: &[bool]) -> Locator {
     let plan = context.plan;
     let good: Vec<&Shot> = context.shots.good.iter().collect();
     let on_datum = |x: usize, y: usize| datum[component_near(context, x, y)?].then_some(());
-    let mut groups =
-        vec![PointGroup { name: "datum".into(), alternatives: vec![points(context, &good, "good", &on_datum, 1.0)] }];
-    if groups[0].alternatives[0].fine.len() < ENOUGH_DATUM_POINTS {
-        groups.extend(plan.nodes.iter().map(|node| component_group(context, node)));
+    let found = points(context, &good, "good", &on_datum, 1.0, None, false);
+    let unsigned = found.fine.len() < ENOUGH_DATUM_POINTS;
+    let mut groups = vec![PointGroup { name: "datum".into(), alternatives: vec![found] }];
+    if unsigned {
+        groups = plan.nodes.iter().map(|node| component_group(context, node)).collect();
     }
     groups.retain(|g| g.alternatives.iter().any(|a| !a.fine.is_empty()));
-    Locator { coarse: plan.base * 2, fine: plan.base, groups, accept: 0.0 }
+    Locator { coarse: plan.base * 2, fine: plan.base, unsigned, groups, accept: 0.0 }
 }
 
 /// A component's edges in its good state and where it is missing.
 fn component_group(context: &Context, node: &NodePlan) -> PointGroup {
-    let inside = |x: usize, y: usize| {
-        let mask = &node.changed;
-        (x < mask.width && y < mask.height && mask.bits[y * mask.width + x]).then_some(())
-    };
+    let wide = dilate(&node.changed, OUTLINE);
+    let inside =
+        |x: usize, y: usize| (x < wide.width && y < wide.height && wide.bits[y * wide.width + x]).then_some(());
     let share = 1.0 / context.plan.nodes.len() as f64;
     let good: Vec<&Shot> = context.shots.good.iter().collect();
-    let mut alternatives = vec![points(context, &good, "good", &inside, share)];
+    let mut alternatives = vec![points(context, &good, "good", &inside, share, None, true)];
     for &m in node.modes.iter().filter(|&&m| context.modes[m].kind == FaultKind::Missing) {
         for (_, _, shots) in pieces(context, m) {
-            alternatives.push(points(context, &shots, "missing", &inside, share));
+            let below = ground_height(context, &wide);
+            alternatives.push(points(context, &shots, "missing", &inside, share, below, true));
         }
     }
     PointGroup { name: context.design.components[node.component].name.clone(), alternatives }
 }
 
-/// Fine and coarse points where `admitted` (px of the shots) says so.
+/// Middle height (mm, station frame) of what surrounds a mask: there the edges lie that a missing component bares.
+fn ground_height(context: &Context, mask: &Mask) -> Option<f64> {
+    let camera = context.camera.reduced(context.plan.base);
+    let around = dilate(mask, OUTLINE);
+    let beside = (0..mask.bits.len()).filter(|&i| around.bits[i] && !mask.bits[i]);
+    let point = |i: usize| context.plan.good.point([i % mask.width, i / mask.width], &camera);
+    let mut heights: Vec<f64> = beside.filter_map(point).map(|p| p[2]).collect();
+    heights.sort_by(f64::total_cmp);
+    heights.get(heights.len() / 2).copied()
+}
+
+/// Fine and coarse points where `admitted` (px of the shots) says so; at `height` (mm, station frame) instead
+/// of on the good assembly's surface, if given.
 fn points(
     context: &Context,
     shots: &[&Shot],
     fault: &str,
     admitted: &dyn Fn(usize, usize) -> Option<()>,
     share: f64,
+    height: Option<f64>,
+    unsigned: bool,
 ) -> PointSet {
     let base = context.plan.base;
     let rows = |factor: u32, count: usize| -> Vec<[i32; 6]> {
@@ -239,11 +259,14 @@ fn points(
             base,
             powers: context.powers,
             seed: context.design.train.seed,
+            unsigned,
         };
         let by = (factor / base) as usize;
         let surface = |x: usize, y: usize| {
             admitted(x * by, y * by)?;
-            surface_point(context, x * by, y * by)
+            let Some(z) = height else { return surface_point(context, x * by, y * by) };
+            let at = [x, y].map(|v| (v as u32 * factor) as f64);
+            context.camera.on_plane(at, z).map(|p| context.home.invert(p))
         };
         let count = (count as f64 * share).ceil() as usize;
         edges::find(&ground, &surface, count).into_iter().map(EdgePoint::to_row).collect()
