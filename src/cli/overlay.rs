@@ -157,6 +157,7 @@ mod tests {
             outline: [[10.0, 10.0], [50.0, 10.0], [50.0, 40.0], [10.0, 40.0]],
             score: 0.0,
             threshold: 0.0,
+            against: Vec::new(),
             best_fault: "missing".into(),
             inside: 1.0,
             faulty,

@@ -61,6 +61,8 @@ pub struct NodeReport {
     /// Log-likelihood ratio of the good state against the best error mode, per coefficient.
     pub score: f64,
     pub threshold: f64,
+    /// Per hypothesis, log-likelihood ratio of the good state against it, per coefficient.
+    pub against: Vec<f64>,
     /// The error mode that fits best.
     pub best_fault: String,
     pub inside: f64,
@@ -113,11 +115,17 @@ impl<'a> Inspector<'a> {
     pub fn inspect(&self, photo: &Photo) -> Verdict {
         let fields = self.search.fields(&photo.light, self.calibration.noise);
         let located = self.search.locate(&fields, &self.camera, &widened(self.model));
-        let least = self.model.locator.accept.max(LEAST_SCORE * self.calibration.score);
+        let least = self.least_score();
         match located {
             Some(found) if found.score >= least => self.judge(photo, found),
             found => not_found(found, least),
         }
+    }
+
+    /// Where the components themselves locate, a photo of other states than the calibration's scores lower by right.
+    fn least_score(&self) -> f64 {
+        let locator = &self.model.locator;
+        if locator.unsigned { locator.accept } else { locator.accept.max(LEAST_SCORE * self.calibration.score) }
     }
 
     fn judge(&self, photo: &Photo, found: Located) -> Verdict {
@@ -158,25 +166,36 @@ impl<'a> Inspector<'a> {
         self.prepared.nodes.iter().zip(densities).map(of).collect()
     }
 
-    /// Densities under this photo's light: hypotheses and light take turns, each making the best of the other.
+    /// Densities under this photo's light. Light and hypotheses take turns, each making the best of the other; they may
+    /// settle on a wrong pair, so they start once from all that is good and once from all that is faulty alike.
     fn relit(&self, pyramid: &super::judge::Pyramid, pose: &Pose) -> Vec<Vec<Density>> {
+        let most = self.prepared.nodes.iter().map(|n| n.hypotheses()).max().unwrap_or(1);
+        let starts = (0..most).map(|h| self.relit_from(pyramid, pose, h));
+        let best = starts.max_by(|a, b| a.1.total_cmp(&b.1));
+        best.map_or_else(Vec::new, |(densities, _)| densities)
+    }
+
+    /// The same from one start, with the log-likelihood of the whole photo.
+    fn relit_from(&self, pyramid: &super::judge::Pyramid, pose: &Pose, start: usize) -> (Vec<Vec<Density>>, f64) {
         const ROUNDS: usize = 2;
         let drift = vec![0.0; self.calibration.lamps.len()];
-        let mut hypotheses = vec![0; self.prepared.nodes.len()];
-        let mut densities = Vec::new();
+        let nodes = &self.prepared.nodes;
+        let mut hypotheses: Vec<usize> = nodes.iter().map(|n| start.min(n.hypotheses() - 1)).collect();
+        let (mut densities, mut total) = (Vec::new(), 0.0);
         for _ in 0..ROUNDS {
             let evidence = self.prepared.light_evidence(pyramid, &self.camera, pose, &hypotheses);
             let fit = fit_lamps(&evidence, &self.calibration.lamps, RELIGHT_PULL);
-            densities = Vec::new();
-            for (node, chosen) in self.prepared.nodes.iter().zip(&mut hypotheses) {
+            (densities, total) = (Vec::new(), 0.0);
+            for (node, chosen) in nodes.iter().zip(&mut hypotheses) {
                 let own = node.densities(&fit.weights, &drift, self.calibration.noise);
                 let reduced = pyramid.at(node.window.frame.factor);
                 let evidence = node.evidence(&own, reduced, &self.camera, pose);
                 *chosen = best(&evidence.log_likelihoods);
+                total += evidence.log_likelihoods[*chosen];
                 densities.push(own);
             }
         }
-        densities
+        (densities, total)
     }
 
     fn report(&self, index: usize, evidence: &Evidence, pose: &Pose) -> NodeReport {
@@ -189,6 +208,7 @@ impl<'a> Inspector<'a> {
             outline: self.carried(node.visible, node.plane, pose),
             score,
             threshold: node.threshold,
+            against: against(evidence, self.coefficients(index)),
             best_fault: fault.map_or_else(String::new, |h| node.hypotheses[h].fault.clone()),
             inside: evidence.inside,
             faulty: score < node.threshold,
@@ -276,6 +296,11 @@ pub fn score(evidence: &Evidence, coefficients: usize) -> (Option<usize>, f64) {
     let l = &evidence.log_likelihoods;
     let fault = (1..l.len()).max_by(|&a, &b| l[a].total_cmp(&l[b]));
     (fault, fault.map_or(f64::INFINITY, |h| (l[0] - l[h]) / coefficients.max(1) as f64))
+}
+
+fn against(evidence: &Evidence, coefficients: usize) -> Vec<f64> {
+    let l = &evidence.log_likelihoods;
+    l.iter().map(|other| (l[0] - other) / coefficients.max(1) as f64).collect()
 }
 
 fn best(log_likelihoods: &[f64]) -> usize {
