@@ -160,7 +160,9 @@ fn scores(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], 
     for (index, node) in model.nodes.iter_mut().enumerate() {
         let of = |verdict: &Verdict| verdict.nodes.get(index).map(|n| rounded(n.score));
         let mut good: Vec<f64> = judged.iter().flat_map(|j| &j.good).filter_map(of).collect();
-        let own = |m: &usize| design.components[modes[*m].component].name == node.name;
+        // A mode that the node gave up has no say in its threshold.
+        let sought = |kind: &str| node.hypotheses.iter().any(|h| h.fault == kind);
+        let own = |m: &usize| design.components[modes[*m].component].name == node.name && sought(modes[*m].kind.word());
         let shown = |scene: &Vec<usize>| scene.iter().any(own);
         let faulty = judged.iter().flat_map(|j| j.faulty.iter().zip(&plan.scenes));
         let mut fault: Vec<f64> =
