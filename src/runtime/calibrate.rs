@@ -15,8 +15,6 @@ use super::pose::{Installation, Pose};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Photos that correlate less with their re-synthesis are refused.
-const LEAST_CORRELATION: f64 = 0.4;
 /// Weight of the spec's lamp powers against the photo, share of the photo's own evidence.
 const PRIOR_PULL: f64 = 1e-3;
 /// Sensor noise that every 8-bit photo has: the rounding (share of full scale).
@@ -54,6 +52,7 @@ pub enum CalibrationError {
     },
     PoorFit {
         correlation: f64,
+        least: f64,
     },
     /// The photo shows a fault, so it would teach it.
     Faulty {
@@ -71,9 +70,9 @@ impl fmt::Display for CalibrationError {
                 write!(f, "E0805: the assembly was not found in the photo (score {score:.2}, at least {least:.2}): ")?;
                 write!(f, "is it the right station, and is the assembly where the spec says?")
             }
-            CalibrationError::PoorFit { correlation } => {
+            CalibrationError::PoorFit { correlation, least } => {
                 write!(f, "E0807: the photo does not look like the assembly under any mix of the station's lamps ")?;
-                write!(f, "(correlation {correlation:.2}, at least {LEAST_CORRELATION})")
+                write!(f, "(correlation {correlation:.2}, at least {least:.2})")
             }
             CalibrationError::Faulty { component, fault } => {
                 write!(f, "E0808: the photo itself shows a fault ({component}: {fault}); ")?;
@@ -150,8 +149,9 @@ pub fn fit(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationEr
     let good = vec![0; prepared.nodes.len()];
     let evidence = prepared.light_evidence(&pyramid, &camera, &poses[0], &good);
     let LightFit { weights, correlation } = fit_lamps(&evidence, &prior, PRIOR_PULL);
-    if correlation < LEAST_CORRELATION {
-        return Err(CalibrationError::PoorFit { correlation });
+    let least = model.station.least_correlation;
+    if correlation < least {
+        return Err(CalibrationError::PoorFit { correlation, least });
     }
     let model = model.digest();
     Ok(Calibration { format: FORMAT, model, installation, lamps: weights, noise, poses, score, correlation })

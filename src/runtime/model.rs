@@ -50,6 +50,8 @@ pub struct Station {
     /// Sensor noise, share of full scale.
     pub noise: f64,
     pub lamps: Vec<Lamp>,
+    /// A calibration photo whose gradients correlate less with their re-synthesis does not show this assembly.
+    pub least_correlation: f64,
 }
 
 /// How far the camera may be from where the spec says: half-widths.
@@ -262,6 +264,7 @@ impl Station {
             && self.standing.as_flattened().iter().all(|v| v.is_finite() && v.abs() < 1e6)
             && self.standing.iter().all(|[low, high]| low <= high)
             && self.install.focal_share.is_finite()
+            && self.least_correlation.is_finite()
             && self.install.k1.iter().all(|v| v.is_finite())
             && camera.focal > 0.0
             && lamps
@@ -407,6 +410,7 @@ pub(crate) mod tests {
                 standing: [[-1.0, 1.0], [-1.0, 1.0], [0.0, 0.0], [0.0, 0.0]],
                 noise: 0.01,
                 lamps: vec![Lamp { name: "key".into(), power: 1.0, drift: 0.15 }],
+                least_correlation: 0.4,
             },
             promise: Promise { false_reject_asked: 0.01, false_reject: rate, escape: rate, modes: vec![] },
             locator: Locator {

@@ -27,6 +27,9 @@ const ACCEPT_SHARE: f64 = 0.5;
 /// went wrong, which say nothing about the node.
 const TRIM: f64 = 0.1;
 
+/// Share of the held-out calibrations' lowest correlation below which a photo is refused.
+const POOREST_FIT: f64 = 0.4;
+
 /// An error mode whose faulty renders score lower than good ones in fewer pairs than this is not told apart: two normal
 /// distributions one standard deviation apart.
 const LEAST_POWER: f64 = 0.76;
@@ -84,6 +87,8 @@ pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, inde
 
 /// One customer's photos, judged.
 struct Judged {
+    /// How well the calibration photo was re-synthesised.
+    correlation: f64,
     good: Vec<Verdict>,
     /// Per scene, per draw.
     faulty: Vec<Vec<Verdict>>,
@@ -100,6 +105,7 @@ pub fn verify(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMod
     let unfit = held_out.len() - judged.len();
     scores(model, design, plan, modes, &judged);
     model.locator.accept = accept(&judged, model.locator.unsigned);
+    model.station.least_correlation = least_correlation(&judged);
     model.promise = promise(model, design, plan, modes, &judged, unfit);
 }
 
@@ -113,7 +119,11 @@ fn judge(model: &Model, plan: &Plan, customer: &Customer, shots: &Shots) -> Opti
         let index = |i: usize| ((scene as u64 + 1) << 20) + i as u64;
         taken.iter().enumerate().map(|(i, f)| inspector.inspect(&take(&f.shot.lamps, index(i)))).collect()
     };
-    Some(Judged { good, faulty: shots.faulty.iter().enumerate().map(scene).collect() })
+    Some(Judged {
+        correlation: calibration.correlation,
+        good,
+        faulty: shots.faulty.iter().enumerate().map(scene).collect(),
+    })
 }
 
 /// Takes from the nodes the error modes that they cannot tell from the good state: against such a mode the likelihood
@@ -173,6 +183,13 @@ fn scores(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], 
         node.good_scores = good;
         node.fault_scores = fault;
     }
+}
+
+/// Renders are re-synthesised by what rendered them, photos are not: a photo may fall this far behind. What correlates less
+/// than [`POOREST_FIT`] of a fit that renders reach shows something else.
+fn least_correlation(judged: &[Judged]) -> f64 {
+    let lowest = judged.iter().map(|j| j.correlation).fold(f64::INFINITY, f64::min);
+    if lowest.is_finite() { rounded((lowest * POOREST_FIT).max(0.0)) } else { 0.0 }
 }
 
 /// The log-likelihood ratio below which a node counts as faulty: its sign decides or, where good and faulty renders lie apart
