@@ -2,13 +2,13 @@
 //!
 //! In: orientation fields of the photo, edge points with 3-D positions. Out: a pose with its score. Coarse: all poses of
 //! a grid, scored by the mean agreement of edge orientations (Steger 2002; the exhaustive first level of the paper's search),
-//! polarity kept unless the model says that the light decides it. Fine: the best few follow their edges to sub-pixel accuracy by robust least squares. Never
-//! judges a component.
+//! polarity kept unless the model says that the light decides it. Fine: the best few follow their edges to sub-pixel
+//! accuracy by robust least squares. Never judges a component.
 
 use super::camera::{Camera, Vec3, sub};
+use super::field::Field;
+use super::follow::{View, follow};
 use super::grid::Grid;
-use super::haar::Integral;
-use super::linear;
 use super::model::{Locator, PointGroup};
 use super::pose::{Installation, Pose};
 
@@ -16,119 +16,6 @@ use super::pose::{Installation, Pose};
 const BEAM: usize = 12;
 /// A coarse step moves edge points by at most this many coarse px.
 const COARSE_STEP_PX: f64 = 1.0;
-/// Search along the edge normal in the fine field's px: first and last reach.
-const FIRST_REACH: f64 = 3.0;
-const LAST_REACH: f64 = 1.25;
-const ROUNDS: usize = 9;
-/// Scale of the robust weight on the distance to an edge (fine px).
-const ROBUST_SCALE: f64 = 0.5;
-/// Standard deviation of one edge point's position (fine px): measurement noise of the calibration's least squares.
-const EDGE_SIGMA: f64 = 0.7;
-/// Agreement an edge must have to count.
-const LEAST_AGREEMENT: f32 = 0.5;
-
-/// Gradient directions of a photo at one resolution.
-pub struct Field {
-    width: usize,
-    height: usize,
-    /// Gradient at pixel corners, divided by its length plus the noise level; of unsigned edges at twice its angle.
-    orientation: Vec<[f32; 2]>,
-    /// The gradient itself.
-    gradient: Vec<[f32; 2]>,
-    unsigned: bool,
-}
-
-/// A vector of the same length at twice the angle: the same for both polarities of an edge.
-pub fn doubled([x, y]: [f32; 2]) -> [f32; 2] {
-    let length = x.hypot(y).max(f32::MIN_POSITIVE);
-    [(x * x - y * y) / length, 2.0 * x * y / length]
-}
-
-/// A vector of the same length at half the angle.
-pub fn halved([x, y]: [f32; 2]) -> [f32; 2] {
-    let (sin, cos) = (y.atan2(x) / 2.0).sin_cos();
-    let length = x.hypot(y);
-    [length * cos, length * sin]
-}
-
-impl Field {
-    /// Orientations of `grid`, whose noise has standard deviation `noise`; `smooth` averages orientations over 3 x 3 px so
-    /// that a coarse grid of poses cannot step over an edge; of `unsigned` edges only the line counts, not its sign.
-    pub fn new(grid: &Grid, noise: f64, smooth: bool, unsigned: bool) -> Field {
-        let (width, height) = (grid.width + 1, grid.height + 1);
-        let integral = Integral::new(grid);
-        let floor = (3.0 * noise / 2.0).max(1e-6) as f32;
-        let mut gradient = vec![[0.0; 2]; width * height];
-        for y in 1..height - 1 {
-            for x in 1..width - 1 {
-                gradient[y * width + x] = integral.gradient(x, y, 1);
-            }
-        }
-        let unit = |g: &[f32; 2]| {
-            let length = (g[0] * g[0] + g[1] * g[1]).sqrt() + floor;
-            let unit = [g[0] / length, g[1] / length];
-            if unsigned { doubled(unit) } else { unit }
-        };
-        let mut orientation: Vec<[f32; 2]> = gradient.iter().map(unit).collect();
-        if smooth {
-            orientation = smoothed(&orientation, width, height);
-        }
-        Field { width, height, orientation, gradient, unsigned }
-    }
-
-    /// Agreement of a unit direction with the orientation at a point (field px); 0 outside the image.
-    fn agreement(&self, at: [f64; 2], direction: [f32; 2]) -> f32 {
-        let (x, y) = (at[0] + 0.5, at[1] + 0.5);
-        if x < 0.0 || y < 0.0 || x >= self.width as f64 || y >= self.height as f64 {
-            return 0.0;
-        }
-        let o = self.orientation[y as usize * self.width + x as usize];
-        let direction = if self.unsigned { doubled(direction) } else { direction };
-        o[0] * direction[0] + o[1] * direction[1]
-    }
-
-    /// Gradient at the pixel corner nearest to a point; `None` outside.
-    pub fn gradient_at(&self, at: [f64; 2]) -> Option<[f32; 2]> {
-        let (x, y) = (at[0] + 0.5, at[1] + 0.5);
-        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
-        inside.then(|| self.gradient[y as usize * self.width + x as usize])
-    }
-
-    /// Gradient across an edge, bilinear, without its sign where edges have none; `None` outside.
-    fn slope(&self, at: [f64; 2], direction: [f32; 2]) -> Option<f32> {
-        let (x, y) = (at[0], at[1]);
-        if !(x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64) {
-            return None;
-        }
-        let (i, j) = (x as usize, y as usize);
-        let (fx, fy) = ((x - i as f64) as f32, (y - j as f64) as f32);
-        let across = |k: usize| {
-            let g = self.gradient[k];
-            g[0] * direction[0] + g[1] * direction[1]
-        };
-        let k = j * self.width + i;
-        let top = across(k) + (across(k + 1) - across(k)) * fx;
-        let bottom = across(k + self.width) + (across(k + self.width + 1) - across(k + self.width)) * fx;
-        let slope = top + (bottom - top) * fy;
-        Some(if self.unsigned { slope.abs() } else { slope })
-    }
-}
-
-fn smoothed(field: &[[f32; 2]], width: usize, height: usize) -> Vec<[f32; 2]> {
-    let mut out = vec![[0.0; 2]; field.len()];
-    for y in 1..height.saturating_sub(1) {
-        for x in 1..width - 1 {
-            let mut sum = [0.0f32; 2];
-            for k in [y - 1, y, y + 1].map(|j| j * width + x - 1) {
-                for o in &field[k..k + 3] {
-                    sum = [sum[0] + o[0], sum[1] + o[1]];
-                }
-            }
-            out[y * width + x] = sum.map(|s| s / 9.0);
-        }
-    }
-    out
-}
 
 /// An edge point: position (mm, assembly frame) and a second point 1 mm along the edge.
 #[derive(Debug, Clone, Copy)]
@@ -151,7 +38,7 @@ impl EdgePoint {
     }
 
     /// Place in the field's px and the direction in which light grows there.
-    fn seen(&self, camera: &Camera, pose: &Pose) -> Option<([f64; 2], [f32; 2])> {
+    pub(super) fn seen(&self, camera: &Camera, pose: &Pose) -> Option<([f64; 2], [f32; 2])> {
         let p = camera.project(pose.apply(self.at))?;
         let q = camera.project(pose.apply(self.along))?;
         let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
@@ -429,103 +316,6 @@ fn best_of(sums: impl Iterator<Item = (f64, usize)>) -> f64 {
         most = most.max(points);
     }
     if most == 0 { 0.0 } else { clearest * (most as f64).sqrt() }
-}
-
-/// One edge point's wish: how far the image of the point should move along its normal, how that motion depends on the
-/// parameters, and how much the wish counts.
-struct Pull {
-    distance: f64,
-    gradient: Vec<f64>,
-    weight: f64,
-}
-
-struct View<'a> {
-    field: &'a Field,
-    camera: &'a Camera,
-}
-
-impl View<'_> {
-    fn pulls(
-        &self,
-        points: &[EdgePoint],
-        reach: f64,
-        parameters: &[f64],
-        project: impl Fn(&[f64], &EdgePoint) -> Option<[f64; 2]>,
-        pose: &Pose,
-        camera: &Camera,
-    ) -> Vec<Pull> {
-        debug_assert!(std::ptr::eq(self.camera, camera));
-        points
-            .iter()
-            .filter_map(|point| {
-                let (at, direction) = point.seen(self.camera, pose)?;
-                let (distance, agreement) = self.nearest_edge(at, direction, reach)?;
-                let along = |p: [f64; 2]| p[0] * f64::from(direction[0]) + p[1] * f64::from(direction[1]);
-                let here = along(project(parameters, point)?);
-                let mut gradient = Vec::with_capacity(parameters.len());
-                let mut moved = parameters.to_vec();
-                for i in 0..parameters.len() {
-                    /// Small against every parameter's range, large against rounding: mm, rad or shares.
-                    const STEP: f64 = 1e-5;
-                    moved[i] += STEP;
-                    gradient.push((along(project(&moved, point)?) - here) / STEP);
-                    moved[i] = parameters[i];
-                }
-                let robust = 1.0 / (1.0 + (distance / ROBUST_SCALE).powi(2));
-                Some(Pull { distance, gradient, weight: f64::from(agreement) * robust })
-            })
-            .collect()
-    }
-
-    /// Distance along the normal to the steepest edge of the right polarity within reach, sub-pixel, and its agreement.
-    fn nearest_edge(&self, at: [f64; 2], direction: [f32; 2], reach: f64) -> Option<(f64, f32)> {
-        const STEP: f64 = 0.5;
-        let steps = (reach / STEP).round() as i32;
-        let point = |t: f64| [at[0] + t * f64::from(direction[0]), at[1] + t * f64::from(direction[1])];
-        let slopes: Option<Vec<f32>> =
-            (-steps..=steps).map(|i| self.field.slope(point(f64::from(i) * STEP), direction)).collect();
-        let slopes = slopes?;
-        let best = (0..slopes.len()).max_by(|&a, &b| slopes[a].total_cmp(&slopes[b]))?;
-        if best == 0 || best + 1 == slopes.len() {
-            return None;
-        }
-        let [a, b, c] = [slopes[best - 1], slopes[best], slopes[best + 1]].map(f64::from);
-        let bend = a - 2.0 * b + c;
-        let shift = if bend < 0.0 { 0.5 * (a - c) / bend } else { 0.0 };
-        let distance = (best as f64 - f64::from(steps) + shift) * STEP;
-        let agreement = self.field.agreement(point(distance), direction);
-        (agreement > LEAST_AGREEMENT).then_some((distance, agreement))
-    }
-}
-
-/// Gauss and Newton with priors: parameters start at 0 and are pulled back with their `spread`.
-fn follow(spread: &[f64], pulls: impl Fn(&[f64], f64) -> Vec<Pull>) -> Vec<f64> {
-    let n = spread.len();
-    let mut parameters = vec![0.0; n];
-    for round in 0..ROUNDS {
-        let t = round as f64 / (ROUNDS - 1) as f64;
-        let pulls = pulls(&parameters, FIRST_REACH + (LAST_REACH - FIRST_REACH) * t);
-        let mut a = vec![0.0; n * n];
-        let mut b = vec![0.0; n];
-        let scale = 1.0 / (EDGE_SIGMA * EDGE_SIGMA);
-        for pull in &pulls {
-            for i in 0..n {
-                let gi = pull.gradient[i] * pull.weight * scale;
-                b[i] += gi * pull.distance;
-                for j in 0..n {
-                    a[i * n + j] += gi * pull.gradient[j];
-                }
-            }
-        }
-        for i in 0..n {
-            let precision = 1.0 / (spread[i] * spread[i]);
-            a[i * n + i] += precision;
-            b[i] -= parameters[i] * precision;
-        }
-        let Some(step) = linear::solve_spd(&a, &b) else { break };
-        parameters.iter_mut().zip(&step).for_each(|(p, s)| *p += s);
-    }
-    parameters
 }
 
 #[cfg(test)]

@@ -5,6 +5,8 @@
 pub mod calibrate;
 pub mod camera;
 pub mod density;
+pub mod field;
+mod follow;
 pub mod grid;
 mod haar;
 pub mod inspect;

@@ -7,8 +7,9 @@
 use super::shots::Shot;
 use crate::rng::Stream;
 use crate::runtime::camera::{Camera, Vec3, normalise, sub};
+use crate::runtime::field::{Field, doubled, halved};
 use crate::runtime::grid::Grid;
-use crate::runtime::locate::{EdgePoint, Field, doubled, halved};
+use crate::runtime::locate::EdgePoint;
 use crate::runtime::pose::Pose;
 
 /// Mean orientation over the draws (0..1) that a point must reach.

@@ -1,0 +1,110 @@
+//! Orientation fields: the direction of every edge of a photo, at one resolution.
+//!
+//! In: a grey image and its noise. Out: gradients and their directions at every pixel corner, from the Haar bands of level 1.
+//! Never knows what it looks for.
+
+use super::grid::Grid;
+use super::haar::Integral;
+
+/// Gradient directions of a photo at one resolution.
+pub struct Field {
+    width: usize,
+    height: usize,
+    /// Gradient at pixel corners, divided by its length plus the noise level; of unsigned edges at twice its angle.
+    orientation: Vec<[f32; 2]>,
+    /// The gradient itself.
+    gradient: Vec<[f32; 2]>,
+    unsigned: bool,
+}
+
+/// A vector of the same length at twice the angle: the same for both polarities of an edge.
+pub fn doubled([x, y]: [f32; 2]) -> [f32; 2] {
+    let length = x.hypot(y).max(f32::MIN_POSITIVE);
+    [(x * x - y * y) / length, 2.0 * x * y / length]
+}
+
+/// A vector of the same length at half the angle.
+pub fn halved([x, y]: [f32; 2]) -> [f32; 2] {
+    let (sin, cos) = (y.atan2(x) / 2.0).sin_cos();
+    let length = x.hypot(y);
+    [length * cos, length * sin]
+}
+
+impl Field {
+    /// Orientations of `grid`, whose noise has standard deviation `noise`; `smooth` averages orientations over 3 x 3 px so
+    /// that a coarse grid of poses cannot step over an edge; of `unsigned` edges only the line counts, not its sign.
+    pub fn new(grid: &Grid, noise: f64, smooth: bool, unsigned: bool) -> Field {
+        let (width, height) = (grid.width + 1, grid.height + 1);
+        let integral = Integral::new(grid);
+        let floor = (3.0 * noise / 2.0).max(1e-6) as f32;
+        let mut gradient = vec![[0.0; 2]; width * height];
+        for y in 1..height - 1 {
+            for x in 1..width - 1 {
+                gradient[y * width + x] = integral.gradient(x, y, 1);
+            }
+        }
+        let unit = |g: &[f32; 2]| {
+            let length = (g[0] * g[0] + g[1] * g[1]).sqrt() + floor;
+            let unit = [g[0] / length, g[1] / length];
+            if unsigned { doubled(unit) } else { unit }
+        };
+        let mut orientation: Vec<[f32; 2]> = gradient.iter().map(unit).collect();
+        if smooth {
+            orientation = smoothed(&orientation, width, height);
+        }
+        Field { width, height, orientation, gradient, unsigned }
+    }
+
+    /// Agreement of a unit direction with the orientation at a point (field px); 0 outside the image.
+    pub(super) fn agreement(&self, at: [f64; 2], direction: [f32; 2]) -> f32 {
+        let (x, y) = (at[0] + 0.5, at[1] + 0.5);
+        if x < 0.0 || y < 0.0 || x >= self.width as f64 || y >= self.height as f64 {
+            return 0.0;
+        }
+        let o = self.orientation[y as usize * self.width + x as usize];
+        let direction = if self.unsigned { doubled(direction) } else { direction };
+        o[0] * direction[0] + o[1] * direction[1]
+    }
+
+    /// Gradient at the pixel corner nearest to a point; `None` outside.
+    pub fn gradient_at(&self, at: [f64; 2]) -> Option<[f32; 2]> {
+        let (x, y) = (at[0] + 0.5, at[1] + 0.5);
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
+        inside.then(|| self.gradient[y as usize * self.width + x as usize])
+    }
+
+    /// Gradient across an edge, bilinear, without its sign where edges have none; `None` outside.
+    pub(super) fn slope(&self, at: [f64; 2], direction: [f32; 2]) -> Option<f32> {
+        let (x, y) = (at[0], at[1]);
+        if !(x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64) {
+            return None;
+        }
+        let (i, j) = (x as usize, y as usize);
+        let (fx, fy) = ((x - i as f64) as f32, (y - j as f64) as f32);
+        let across = |k: usize| {
+            let g = self.gradient[k];
+            g[0] * direction[0] + g[1] * direction[1]
+        };
+        let k = j * self.width + i;
+        let top = across(k) + (across(k + 1) - across(k)) * fx;
+        let bottom = across(k + self.width) + (across(k + self.width + 1) - across(k + self.width)) * fx;
+        let slope = top + (bottom - top) * fy;
+        Some(if self.unsigned { slope.abs() } else { slope })
+    }
+}
+
+fn smoothed(field: &[[f32; 2]], width: usize, height: usize) -> Vec<[f32; 2]> {
+    let mut out = vec![[0.0; 2]; field.len()];
+    for y in 1..height.saturating_sub(1) {
+        for x in 1..width - 1 {
+            let mut sum = [0.0f32; 2];
+            for k in [y - 1, y, y + 1].map(|j| j * width + x - 1) {
+                for o in &field[k..k + 3] {
+                    sum = [sum[0] + o[0], sum[1] + o[1]];
+                }
+            }
+            out[y * width + x] = sum.map(|s| s / 9.0);
+        }
+    }
+    out
+}

@@ -1,0 +1,118 @@
+//! Following edges: robust least squares from edge points to the parameters that move them.
+//!
+//! In: an orientation field, edge points and how they move with the parameters. Out: the parameters, to a fraction of a px.
+//! Never decides which edges to follow.
+
+use super::camera::Camera;
+use super::field::Field;
+use super::linear;
+use super::locate::EdgePoint;
+use super::pose::Pose;
+
+/// Search along the edge normal in the fine field's px: first and last reach.
+const FIRST_REACH: f64 = 3.0;
+const LAST_REACH: f64 = 1.25;
+const ROUNDS: usize = 9;
+/// Scale of the robust weight on the distance to an edge (fine px).
+const ROBUST_SCALE: f64 = 0.5;
+/// Standard deviation of one edge point's position (fine px): measurement noise of the calibration's least squares.
+const EDGE_SIGMA: f64 = 0.7;
+/// Agreement an edge must have to count.
+const LEAST_AGREEMENT: f32 = 0.5;
+
+/// One edge point's wish: how far the image of the point should move along its normal, how that motion depends on the
+/// parameters, and how much the wish counts.
+pub(super) struct Pull {
+    distance: f64,
+    gradient: Vec<f64>,
+    weight: f64,
+}
+
+pub(super) struct View<'a> {
+    pub(super) field: &'a Field,
+    pub(super) camera: &'a Camera,
+}
+
+impl View<'_> {
+    pub(super) fn pulls(
+        &self,
+        points: &[EdgePoint],
+        reach: f64,
+        parameters: &[f64],
+        project: impl Fn(&[f64], &EdgePoint) -> Option<[f64; 2]>,
+        pose: &Pose,
+        camera: &Camera,
+    ) -> Vec<Pull> {
+        debug_assert!(std::ptr::eq(self.camera, camera));
+        points
+            .iter()
+            .filter_map(|point| {
+                let (at, direction) = point.seen(self.camera, pose)?;
+                let (distance, agreement) = self.nearest_edge(at, direction, reach)?;
+                let along = |p: [f64; 2]| p[0] * f64::from(direction[0]) + p[1] * f64::from(direction[1]);
+                let here = along(project(parameters, point)?);
+                let mut gradient = Vec::with_capacity(parameters.len());
+                let mut moved = parameters.to_vec();
+                for i in 0..parameters.len() {
+                    /// Small against every parameter's range, large against rounding: mm, rad or shares.
+                    const STEP: f64 = 1e-5;
+                    moved[i] += STEP;
+                    gradient.push((along(project(&moved, point)?) - here) / STEP);
+                    moved[i] = parameters[i];
+                }
+                let robust = 1.0 / (1.0 + (distance / ROBUST_SCALE).powi(2));
+                Some(Pull { distance, gradient, weight: f64::from(agreement) * robust })
+            })
+            .collect()
+    }
+
+    /// Distance along the normal to the steepest edge of the right polarity within reach, sub-pixel, and its agreement.
+    fn nearest_edge(&self, at: [f64; 2], direction: [f32; 2], reach: f64) -> Option<(f64, f32)> {
+        const STEP: f64 = 0.5;
+        let steps = (reach / STEP).round() as i32;
+        let point = |t: f64| [at[0] + t * f64::from(direction[0]), at[1] + t * f64::from(direction[1])];
+        let slopes: Option<Vec<f32>> =
+            (-steps..=steps).map(|i| self.field.slope(point(f64::from(i) * STEP), direction)).collect();
+        let slopes = slopes?;
+        let best = (0..slopes.len()).max_by(|&a, &b| slopes[a].total_cmp(&slopes[b]))?;
+        if best == 0 || best + 1 == slopes.len() {
+            return None;
+        }
+        let [a, b, c] = [slopes[best - 1], slopes[best], slopes[best + 1]].map(f64::from);
+        let bend = a - 2.0 * b + c;
+        let shift = if bend < 0.0 { 0.5 * (a - c) / bend } else { 0.0 };
+        let distance = (best as f64 - f64::from(steps) + shift) * STEP;
+        let agreement = self.field.agreement(point(distance), direction);
+        (agreement > LEAST_AGREEMENT).then_some((distance, agreement))
+    }
+}
+
+/// Gauss and Newton with priors: parameters start at 0 and are pulled back with their `spread`.
+pub(super) fn follow(spread: &[f64], pulls: impl Fn(&[f64], f64) -> Vec<Pull>) -> Vec<f64> {
+    let n = spread.len();
+    let mut parameters = vec![0.0; n];
+    for round in 0..ROUNDS {
+        let t = round as f64 / (ROUNDS - 1) as f64;
+        let pulls = pulls(&parameters, FIRST_REACH + (LAST_REACH - FIRST_REACH) * t);
+        let mut a = vec![0.0; n * n];
+        let mut b = vec![0.0; n];
+        let scale = 1.0 / (EDGE_SIGMA * EDGE_SIGMA);
+        for pull in &pulls {
+            for i in 0..n {
+                let gi = pull.gradient[i] * pull.weight * scale;
+                b[i] += gi * pull.distance;
+                for j in 0..n {
+                    a[i * n + j] += gi * pull.gradient[j];
+                }
+            }
+        }
+        for i in 0..n {
+            let precision = 1.0 / (spread[i] * spread[i]);
+            a[i * n + i] += precision;
+            b[i] -= parameters[i] * precision;
+        }
+        let Some(step) = linear::solve_spd(&a, &b) else { break };
+        parameters.iter_mut().zip(&step).for_each(|(p, s)| *p += s);
+    }
+    parameters
+}
