@@ -187,6 +187,10 @@ fn shape(feature: &Feature) -> &'static str {
         Some(Shape::Cylinder { .. }) => "cylinder",
         Some(Shape::Cone { .. }) => "cone",
         Some(Shape::Sphere { .. }) => "sphere",
+        Some(Shape::Torus { .. }) => "torus",
+        Some(Shape::Prism { .. }) => "prism",
+        Some(Shape::Revolve { .. }) => "revolve",
+        Some(Shape::Group { .. }) => "group",
         None => "nothing",
     }
 }

@@ -37,6 +37,7 @@ impl<'a> Chart<'a> {
             Surface::Cylinder { point, axis, .. } => (*point, *axis),
             Surface::Cone { apex, axis, .. } => (*apex, *axis),
             Surface::Sphere { centre, .. } => (*centre, Vector3::z_axis()),
+            Surface::Torus { centre, axis, .. } => (*centre, *axis),
         };
         let (u, v) = square_to(w);
         Chart { surface, origin, u, v, w: w.into_inner() }
@@ -61,6 +62,7 @@ impl<'a> Chart<'a> {
         match self.surface {
             Surface::Plane { .. } => 0.0,
             Surface::Cylinder { radius, .. } | Surface::Sphere { radius, .. } => h / radius,
+            Surface::Torus { .. } => h,
             Surface::Cone { half_angle, .. } => (2.0 * h.max(0.0) / half_angle.tan() * half_angle.cos()).sqrt(),
         }
     }
@@ -76,6 +78,7 @@ impl<'a> Chart<'a> {
         match self.surface {
             Surface::Plane { .. } => [x, y],
             Surface::Cylinder { radius, .. } | Surface::Sphere { radius, .. } => [y.atan2(x), radius * z],
+            Surface::Torus { minor, .. } => [y.atan2(x), minor * self.surface.chart(p)[1]],
             // dA = s sin(a) ds dθ with s = z / cos(a): the second coordinate is s² sin(a) / 2.
             Surface::Cone { half_angle, .. } => [y.atan2(x), z * z * half_angle.tan() / half_angle.cos() / 2.0],
         }

@@ -112,8 +112,8 @@ pub enum Extent {
     Through,
 }
 
-/// A primitive in its own frame. Boxes, cylinders and cones stand on z = 0; a box is centred in x and y; a sphere is
-/// centred on the origin.
+/// A primitive in its own frame. Boxes, cylinders, cones and prisms stand on z = 0; a box is centred in x and y; a sphere
+/// and a torus are centred on the origin.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Shape {
     Box {
@@ -135,6 +135,65 @@ pub enum Shape {
     Sphere {
         d: Expr,
     },
+    /// Diameter of the circle in z = 0 that the tube is centred on, and of the tube.
+    Torus {
+        d: Expr,
+        tube: Expr,
+    },
+    /// An outline in x and y, extruded along z.
+    Prism {
+        outline: Outline,
+        h: Extent,
+    },
+    /// An outline in x (the distance from the axis, nowhere negative) and z, turned a whole turn about z.
+    Revolve {
+        outline: Outline,
+    },
+    /// Features folded among themselves, in the group's frame. The group has material where its features leave some.
+    Group {
+        features: Vec<Feature>,
+    },
+}
+
+/// A closed outline in a plane, mm: from `start` along its sides; a straight side leads back to `start` where the last
+/// side does not end there. Either way round; it may not cross or touch itself.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outline {
+    pub start: [Expr; 2],
+    pub start_corner: Corner,
+    pub sides: Vec<OutlineSide>,
+}
+
+/// One side of an outline, from where the one before it ended.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutlineSide {
+    /// Names the face it makes: `rail.flank`, or `rail.2` for the second side of an outline without names.
+    pub name: String,
+    pub to: [Expr; 2],
+    pub path: OutlinePath,
+    /// What becomes of the corner at `to`.
+    pub corner: Corner,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum OutlinePath {
+    Line,
+    /// An arc of this radius; counter-clockwise when `left`; more than half a turn when `long`.
+    Arc {
+        radius: Expr,
+        left: bool,
+        long: bool,
+    },
+}
+
+/// The corner between two straight sides.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum Corner {
+    Sharp,
+    /// Rounded with this radius.
+    Round(Expr),
+    /// Cut off at this distance from the corner on both sides.
+    Chamfer(Expr),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -307,6 +307,9 @@ pub fn shape_exprs(shape: &mut Shape) -> Vec<&mut Expr> {
         Shape::Cylinder { d, h } => (vec![d], Some(h)),
         Shape::Cone { d1, d2, h } => (vec![d1, d2], Some(h)),
         Shape::Sphere { d } => (vec![d], None),
+        Shape::Torus { d, tube } => (vec![d, tube], None),
+        Shape::Prism { h, .. } => (vec![], Some(h)),
+        Shape::Revolve { .. } | Shape::Group { .. } => (vec![], None),
     };
     if let Some(Extent::Length(length)) = extent {
         sizes.push(length);

@@ -162,7 +162,7 @@ impl<'a> Tree<'a> {
 
 /// Whether two surfaces are the same set of points, and if so whether their canonical normals agree.
 pub(super) fn coincide(a: &Surface, b: &Surface) -> Option<bool> {
-    use Surface::{Cone, Cylinder, Plane, Sphere};
+    use Surface::{Cone, Cylinder, Plane, Sphere, Torus};
     let near = |x: f64, y: f64| (x - y).abs() < tolerance::POINT;
     let along = |d: &Unit<Vector3<f64>>, e: &Unit<Vector3<f64>>| d.cross(e).norm() < tolerance::DIRECTION;
     match (a, b) {
@@ -180,6 +180,10 @@ pub(super) fn coincide(a: &Surface, b: &Surface) -> Option<bool> {
         }
         (Sphere { centre: p, radius: r }, Sphere { centre: q, radius: s }) => {
             (near(*r, *s) && (p - q).norm() < tolerance::POINT).then_some(true)
+        }
+        (Torus { centre: p, axis: n, major: a, minor: r }, Torus { centre: q, axis: m, major: b, minor: s }) => {
+            let same = near(*a, *b) && near(*r, *s) && along(n, m);
+            (same && (p - q).norm() < tolerance::POINT).then_some(true)
         }
         _ => None,
     }
@@ -243,6 +247,14 @@ fn measure(part: &Part, values: &Values) -> Result<Vec<Vec<Sized>>, Vec<Diagnost
     Ok(sized)
 }
 
+/// The surface of a face by its name; see [`super::side_at`].
+pub(super) fn side_at(part: &Part, values: &Values, face: &str) -> Option<Surface> {
+    let tree = Tree::build(part, values).ok()?;
+    let (leaf, side) = face.rsplit_once('.')?;
+    let leaf = tree.leaves.iter().find(|l| l.name == leaf)?;
+    leaf.sides.iter().find(|s| s.name == side).map(|s| tree.surfaces[s.surface].clone())
+}
+
 /// Numbers of one copy; a `through` extent is left empty (`low == high`).
 fn size(copy: &FeatureCopy, values: &Values) -> Result<Sized, &'static str> {
     let pose = copy.pose.eval(values);
@@ -272,6 +284,7 @@ fn size(copy: &FeatureCopy, values: &Values) -> Result<Sized, &'static str> {
             let radius = half(d)?;
             (Kind::Ball { radius }, -radius, radius)
         }
+        _ => return Err("is of a shape that is not built yet"),
     };
     let placed = pose.translation.vector.iter().all(|v| v.abs() <= LARGEST);
     let turned = pose.rotation.coords.iter().all(|v| v.is_finite());

@@ -19,7 +19,7 @@ type Direction = Unit<Vector3<f64>>;
 
 /// Curves common to `a` and `b`, in a fixed order.
 pub(super) fn intersect(a: &Surface, b: &Surface) -> Shared {
-    use Surface::{Cone, Cylinder, Plane, Sphere};
+    use Surface::{Cone, Cylinder, Plane, Sphere, Torus};
     match (a, b) {
         (Plane { normal: n, offset: d }, Plane { normal: m, offset: e }) => Ok(planes((n, *d), (m, *e))),
         (Plane { normal, .. }, Cylinder { point, axis, radius }) => {
@@ -34,6 +34,7 @@ pub(super) fn intersect(a: &Surface, b: &Surface) -> Shared {
         (Cylinder { point: p, axis: d, radius: r }, Cylinder { point: q, axis: e, radius: s }) => {
             cylinders((p, d, *r), (q, e, *s))
         }
+        (Torus { .. }, _) | (_, Torus { .. }) => Err(Oblique),
         (Sphere { centre: p, radius: r }, Sphere { centre: q, radius: s }) => Ok(spheres(p, *r, q, *s)),
         (Cylinder { .. } | Cone { .. }, Cone { .. }) | (Cylinder { .. } | Cone { .. }, Sphere { .. }) => coaxial(a, b),
         _ => intersect(b, a),
@@ -199,7 +200,7 @@ impl Section {
             }
             Surface::Cylinder { radius, .. } => Section::Line { at: *radius, slope: 0.0 },
             Surface::Sphere { radius, .. } => Section::Round { at: shift, radius: *radius },
-            Surface::Plane { .. } => Section::Line { at: 0.0, slope: 0.0 },
+            Surface::Plane { .. } | Surface::Torus { .. } => Section::Line { at: 0.0, slope: 0.0 },
         }
     }
 

@@ -112,7 +112,9 @@ impl Form {
                 let (sin, cos) = half_angle.sin_cos();
                 ((Matrix3::identity() - along) * (cos * cos) - along * (sin * sin), Vector3::zeros(), 0.0)
             }
-            Surface::Sphere { radius, .. } => (Matrix3::identity() / (2.0 * radius), Vector3::zeros(), radius / 2.0),
+            Surface::Sphere { radius, .. } | Surface::Torus { minor: radius, .. } => {
+                (Matrix3::identity() / (2.0 * radius), Vector3::zeros(), radius / 2.0)
+            }
         };
         Form { origin: surface.origin(), square, linear, constant }
     }

@@ -66,11 +66,13 @@ pub(super) fn flux(surface: &Surface, outward: bool, loops: &[Vec<Run>], from: &
     let area = match surface {
         Surface::Plane { normal, .. } => normal.dot(&vector) * sense,
         Surface::Cylinder { .. } | Surface::Cone { .. } => sense * developed(surface, loops),
-        Surface::Sphere { radius, .. } => radius * radius * spherical_angle(surface, sense, loops),
+        Surface::Sphere { radius, .. } | Surface::Torus { minor: radius, .. } => {
+            radius * radius * spherical_angle(surface, sense, loops)
+        }
     };
     // p·n = offset·n + the distance of the surface from its own origin along n.
     let own = match surface {
-        Surface::Plane { .. } | Surface::Cone { .. } => 0.0,
+        Surface::Plane { .. } | Surface::Cone { .. } | Surface::Torus { .. } => 0.0,
         Surface::Cylinder { radius, .. } | Surface::Sphere { radius, .. } => *radius,
     };
     // The vector area already points outwards, for it follows the loops.

@@ -142,7 +142,7 @@ fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
 /// about the axis and rulings stay straight and triangles keep their shape.
 fn flat(surface: &Surface, girth: f64, uv: [f64; 2]) -> [f64; 2] {
     match surface {
-        Surface::Plane { .. } | Surface::Cylinder { .. } => uv,
+        Surface::Plane { .. } | Surface::Cylinder { .. } | Surface::Torus { .. } => uv,
         Surface::Cone { half_angle, .. } => [uv[0] * girth, slant(*half_angle, uv[1])],
         Surface::Sphere { radius, .. } => [uv[0], radius * (uv[1] / radius - 1.0).clamp(-1.0, 1.0).asin()],
     }

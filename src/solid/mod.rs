@@ -46,6 +46,12 @@ pub fn evaluate(part: &Part, values: &Values, quality: &Quality) -> Result<Solid
     Ok(solid)
 }
 
+/// The surface that a face of this name (`bore[2].side`, `slab.top`) lies on at these dimensions, in the part's frame;
+/// `None` for a name that is no side of a feature, or where a size makes no sense.
+pub fn side_at(part: &Part, values: &Values, face: &str) -> Option<Surface> {
+    csg::side_at(part, values, face)
+}
+
 /// A surface without a sense: which side is material belongs to the face. All in the part's frame, mm and rad.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Surface {
@@ -69,24 +75,39 @@ pub enum Surface {
         centre: Point3<f64>,
         radius: f64,
     },
+    /// A tube of radius `minor` about a circle of radius `major` round the axis. `minor` may exceed `major`, and `major`
+    /// may be negative (a barrel: its profile is centred beyond the axis): then only the part whose profile lies on the
+    /// near side of the axis is meant.
+    Torus {
+        centre: Point3<f64>,
+        axis: Unit<Vector3<f64>>,
+        major: f64,
+        minor: f64,
+    },
 }
 
 /// The curve an edge lies on.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Curve {
     Line,
+    /// Counter-clockwise about the axis, from the edge's start to its end.
     Circle {
         centre: Point3<f64>,
         axis: Unit<Vector3<f64>>,
         radius: f64,
     },
+    /// From `major` towards `minor`, which are square to each other and as long as the half axes.
     Ellipse {
         centre: Point3<f64>,
         major: Vector3<f64>,
         minor: Vector3<f64>,
     },
-    /// Any other intersection curve: its samples, exact to the kernel's tolerance.
-    Sampled,
+    /// Any other intersection curve, as a piecewise cubic from the edge's start to its end: at the whole parameter i it
+    /// passes through `points[i]` with the derivative `tangents[i]`. Both surfaces are nearer than 1e-4 mm everywhere.
+    Spline {
+        points: Vec<Point3<f64>>,
+        tangents: Vec<Vector3<f64>>,
+    },
 }
 
 /// Where two faces meet.

@@ -25,7 +25,7 @@ impl Surface {
     pub fn axis(&self) -> Unit<Vector3<f64>> {
         match self {
             Surface::Plane { normal, .. } => *normal,
-            Surface::Cylinder { axis, .. } | Surface::Cone { axis, .. } => *axis,
+            Surface::Cylinder { axis, .. } | Surface::Cone { axis, .. } | Surface::Torus { axis, .. } => *axis,
             Surface::Sphere { .. } => Unit::new_normalize(Vector3::new(0.3285, 0.4871, 0.8093)),
         }
     }
@@ -36,7 +36,7 @@ impl Surface {
             Surface::Plane { normal, offset } => Point3::from(normal.into_inner() * *offset),
             Surface::Cylinder { point, .. } => *point,
             Surface::Cone { apex, .. } => *apex,
-            Surface::Sphere { centre, .. } => *centre,
+            Surface::Sphere { centre, .. } | Surface::Torus { centre, .. } => *centre,
         }
     }
 
@@ -60,6 +60,10 @@ impl Surface {
                 radial(apex, axis, p).norm() * cos - (p - apex).dot(axis) * sin
             }
             Surface::Sphere { centre, radius } => (p - centre).norm() - radius,
+            Surface::Torus { centre, axis, major, minor } => {
+                let rho = radial(centre, axis, p).norm();
+                (rho - major).hypot((p - centre).dot(axis)) - minor
+            }
         }
     }
 
@@ -76,6 +80,10 @@ impl Surface {
                 if out == Vector3::zeros() { out } else { out * cos - axis.into_inner() * sin }
             }
             Surface::Sphere { centre, .. } => unit(p - centre),
+            Surface::Torus { centre, axis, major, .. } => {
+                let out = unit(radial(centre, axis, p));
+                unit(p - centre - out * *major)
+            }
         }
     }
 
@@ -90,6 +98,13 @@ impl Surface {
                 half_angle.cos() / out.norm().max(f64::MIN_POSITIVE) * d.dot(&round).powi(2)
             }
             Surface::Sphere { radius, .. } => 1.0 / radius,
+            Surface::Torus { centre, axis, minor, .. } => {
+                let out = radial(centre, axis, p);
+                let rho = out.norm().max(f64::MIN_POSITIVE);
+                let round = axis.cross(&out) / rho;
+                let (along, around) = (d.dot(&round).powi(2), 1.0 - d.dot(&round).powi(2));
+                self.normal_at(p).dot(&out) / (rho * rho) * along + around / minor
+            }
         }
     }
 
@@ -99,12 +114,14 @@ impl Surface {
             Surface::Plane { .. } => None,
             Surface::Cylinder { radius, .. } | Surface::Sphere { radius, .. } => Some(TAU * radius),
             Surface::Cone { .. } => Some(TAU),
+            Surface::Torus { minor, .. } => Some(TAU * minor),
         }
     }
 
     /// Chart coordinates of `p`, in the frame of [`Surface::frame`]:
     /// plane (x, y); cylinder (rθ, z); cone (θ, s² sin α / 2) with s the distance from the apex; sphere
-    /// (Rθ, R + z), z the height above the centre. θ in -π..=π. Equal-area in each case.
+    /// (Rθ, R + z), z the height above the centre; torus (rθ, Rφ + r sin φ), φ the angle round the tube from the side away
+    /// from the axis. θ and φ in -π..=π. Equal-area in each case.
     pub fn chart(&self, p: &Point3<f64>) -> [f64; 2] {
         let q = p - self.origin();
         let axis = self.axis();
@@ -115,6 +132,10 @@ impl Surface {
             Surface::Cylinder { radius, .. } => [radius * b.atan2(a), c],
             Surface::Cone { half_angle, .. } => [b.atan2(a), q.norm_squared() * half_angle.sin() / 2.0],
             Surface::Sphere { radius, .. } => [radius * b.atan2(a), radius + c],
+            Surface::Torus { major, minor, .. } => {
+                let tube = c.atan2(a.hypot(b) - major);
+                [minor * b.atan2(a), major * tube + minor * tube.sin()]
+            }
         }
     }
 
@@ -138,6 +159,10 @@ impl Surface {
                 let z = (uv[1] - radius).clamp(-*radius, *radius);
                 ring(uv[0] / radius, (radius * radius - z * z).max(0.0).sqrt(), z)
             }
+            Surface::Torus { major, minor, .. } => {
+                let (sin, cos) = tube_angle(*major, *minor, uv[1]).sin_cos();
+                ring(uv[0] / minor, major + minor * cos, minor * sin)
+            }
         }
     }
 
@@ -154,9 +179,41 @@ impl Surface {
                 let sin = ((uv[1] - radius) / radius).clamp(-1.0, 1.0);
                 out(uv[0] / radius) * (1.0 - sin * sin).sqrt() + axis * sin
             }
+            Surface::Torus { major, minor, .. } => {
+                let (sin, cos) = tube_angle(*major, *minor, uv[1]).sin_cos();
+                out(uv[0] / minor) * cos + axis * sin
+            }
         }
     }
 }
+
+/// The angle φ round the tube of a torus with `major φ + minor sin φ = v`: the left side never falls where the surface
+/// is, so bisection finds it, and Newton's steps make it exact.
+pub(super) fn tube_angle(major: f64, minor: f64, v: f64) -> f64 {
+    let turns = if major > minor { (v / (TAU * major)).round() } else { 0.0 };
+    let v = v - turns * TAU * major;
+    let reach = if major >= minor { TAU / 2.0 } else { (-major / minor).acos() };
+    let (mut low, mut high) = (-reach, reach);
+    let mut angle = (v / (major + minor)).clamp(low, high);
+    for _ in 0..TUBE_STEPS {
+        let excess = major * angle + minor * angle.sin() - v;
+        if excess > 0.0 {
+            high = angle
+        } else {
+            low = angle
+        }
+        let newton = angle - excess / (major + minor * angle.cos());
+        let next = if newton > low && newton < high { newton } else { (low + high) / 2.0 };
+        if next == angle {
+            break;
+        }
+        angle = next;
+    }
+    angle + turns * TAU
+}
+
+/// Steps after which bisection alone has used up the precision of a double.
+const TUBE_STEPS: usize = 60;
 
 /// The part of `p - foot` across `axis`.
 pub(super) fn radial(foot: &Point3<f64>, axis: &Unit<Vector3<f64>>, p: &Point3<f64>) -> Vector3<f64> {
@@ -176,6 +233,9 @@ mod tests {
             Surface::Cylinder { point: p, axis, radius: 2.5 },
             Surface::Cone { apex: p, axis, half_angle: 0.4 },
             Surface::Sphere { centre: p, radius: 4.0 },
+            Surface::Torus { centre: p, axis, major: 5.0, minor: 2.0 },
+            Surface::Torus { centre: p, axis, major: 1.5, minor: 2.0 },
+            Surface::Torus { centre: p, axis, major: -3.0, minor: 7.0 },
         ]
     }
 

@@ -36,7 +36,7 @@ fn ball(d: f64) -> Shape {
 fn through(mut shape: Shape) -> Shape {
     match &mut shape {
         Shape::Box { z: e, .. } | Shape::Cylinder { h: e, .. } | Shape::Cone { h: e, .. } => *e = Extent::Through,
-        Shape::Sphere { .. } => {}
+        _ => {}
     }
     shape
 }
