@@ -3,8 +3,8 @@
 //! In: `root` and `place` statements. Out: components, parents before their children, each with its part, the frame it
 //! is placed in and its pose with its tolerance zone.
 
+use super::dimension::General;
 use super::fields::Fields;
-use super::measure::General;
 use super::model::{Component, Expr, Part, PoseExpr};
 use super::part::PartSource;
 use super::scope::{Remark, Resolver};

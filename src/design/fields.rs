@@ -3,7 +3,7 @@
 //! In: `name = value` pairs. Out: single values in mm, rad and plain numbers, with a diagnostic for every name that is
 //! unknown, given twice or missing.
 
-use super::measure::General;
+use super::dimension::General;
 use super::model::Expr;
 use super::scope::Resolver;
 use crate::diag::suggest::nearest;

@@ -245,6 +245,7 @@ fn resolve(trees: &[Tree], overrides: &[(ast::Name, ast::Dim)]) -> (Option<Desig
         Some((name, body)) => built = resolver.assemble(body, name.span, &catalogue),
         None => resolver.no_assembly(trees),
     }
+    let measures = blocks.assembly.map_or(Vec::new(), |(_, body)| resolver.measures(body, &built));
     resolver.senses(&built.parts);
     let stations = resolver.stations(&blocks, &catalogue);
     let inspect = resolver.inspect(blocks.inspect.map(|(_, body, span)| (body, span)), &built);
@@ -254,7 +255,7 @@ fn resolve(trees: &[Tree], overrides: &[(ast::Name, ast::Dim)]) -> (Option<Desig
     resolver.warn_unused(&blocks);
     let name = blocks.assembly.map_or(String::new(), |(name, _)| name.text.clone());
     let (parts, components) = (built.parts, built.components);
-    let design = Design { name, dims: resolver.dims, materials, parts, components, stations, inspect, train };
+    let design = Design { name, dims: resolver.dims, materials, parts, components, measures, stations, inspect, train };
     (Some(design), resolver.diagnostics)
 }
 

@@ -408,6 +408,29 @@ pub struct Train {
     pub uniform: bool,
 }
 
+/// A face of a component, by name.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct FacePath {
+    /// Index into [`Design::components`].
+    pub component: usize,
+    /// The face in its part, as the solid names it: `slab.top`, `bore[2].side`.
+    pub face: String,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// A distance (mm) between two faces of the assembly that the drawing asks for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Measure {
+    pub name: String,
+    pub from: FacePath,
+    pub to: FacePath,
+    /// What it has to stay within, if the spec says so.
+    pub limits: Option<Range>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
 /// The whole spec, resolved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Design {
@@ -417,6 +440,9 @@ pub struct Design {
     pub materials: Vec<Material>,
     pub parts: Vec<Part>,
     pub components: Vec<Component>,
+    /// In the order of the spec. Left out where there are none, so that a design without them serialises as ever.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub measures: Vec<Measure>,
     pub stations: Vec<Station>,
     pub inspect: Inspect,
     pub train: Train,

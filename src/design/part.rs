@@ -1,7 +1,7 @@
 //! `part`: a feature list becomes primitives with expressions for sizes and poses.
 
+use super::dimension::{General, trim};
 use super::fields::Fields;
-use super::measure::{General, trim};
 use super::model::{DimId, Expr, Extent, Feature, FeatureCopy, Op, Part, PoseExpr, Shape};
 use super::scope::{Named, Resolver};
 use crate::diag::suggest::nearest;

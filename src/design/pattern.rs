@@ -3,8 +3,8 @@
 //! `circle` turns each copy with its place; `line` runs from the feature's place along x; `grid` is centred on it and
 //! numbered in reading order, from -x to +x and from +y down to -y.
 
+use super::dimension::General;
 use super::fields::Fields;
-use super::measure::General;
 use super::model::Expr;
 use super::part::Frame;
 use super::scope::Resolver;

@@ -3,7 +3,7 @@
 //! Lengths add to lengths and angles to angles; plain numbers scale either; a length over a length is a ratio. A bare number
 //! added to a length is a length in the unit of its file.
 
-use super::measure::spoken;
+use super::dimension::spoken;
 use super::model::Expr;
 use super::scope::{Resolver, Typed, Use};
 use crate::diag::{Diagnostic, Span};

@@ -73,6 +73,7 @@ pub enum Stmt {
         part: Option<Name>,
     },
     Place(Box<Place>),
+    Measure(Box<Measure>),
     Station {
         name: Name,
         body: Body,
@@ -132,6 +133,24 @@ pub struct Place {
     pub part: Option<Name>,
     pub on: Path,
     pub body: Option<Body>,
+}
+
+/// `measure gap = from plate.slab.top to pin[2].head.bottom within 0.1 .. 0.4`
+#[derive(Debug, Clone, Serialize)]
+pub struct Measure {
+    pub name: Name,
+    pub from: Face,
+    pub to: Face,
+    pub within: Option<Dim>,
+}
+
+/// `pin[2].head.bottom`: a component, and the name of a face of its part.
+#[derive(Debug, Clone, Serialize)]
+pub struct Face {
+    pub component: Segment,
+    pub face: Name,
+    #[serde(skip)]
+    pub span: Span,
 }
 
 /// `3x`

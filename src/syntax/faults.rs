@@ -26,10 +26,11 @@ pub fn describe(text: &str, fault: &Fault, file: u32, offset: usize) -> Diagnost
         let help = format!("did you mean `{meant}`?");
         return Diagnostic::error("E0101", span(at, word.len()), message).label("not a feature").help(help);
     }
-    let found = token_at(text, fault.at);
+    // Inside a token that takes no blanks the parser stops before them; the reader looks at what follows.
+    let at = text.len() - text[fault.at..].trim_start_matches([' ', '\t']).len();
+    let found = token_at(text, at);
     let message = format!("expected {}, found {}", list(&fault.expected), spoken(found));
-    let diagnostic =
-        Diagnostic::error("E0101", span(fault.at, found.trim_end().len()), message).label("not expected here");
+    let diagnostic = Diagnostic::error("E0101", span(at, found.trim_end().len()), message).label("not expected here");
     match keyword_meant(found, &fault.expected) {
         Some(meant) => diagnostic.help(format!("did you mean `{meant}`?")),
         None => diagnostic,

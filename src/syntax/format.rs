@@ -93,6 +93,7 @@ fn head(stmt: &Stmt) -> Option<String> {
         Stmt::Let { name, .. } => format!("let {}", name.text),
         Stmt::Feature(f) => format!("{} {}", f.op.text, f.name.text),
         Stmt::Light { name, .. } => format!("light {}", name.text),
+        Stmt::Measure(m) => format!("measure {}", m.name.text),
         Stmt::Field { key, .. } => key.text.clone(),
         _ => return None,
     })
@@ -149,7 +150,9 @@ fn head_and_tail(stmt: &Stmt, width: usize, layout: Layout) -> String {
         Stmt::Watch { path, args: Some(list) } => format!("watch {} {}", path_text(path), args(list, layout)),
         Stmt::Ignore(path) => format!("ignore {}", path_text(path)),
         Stmt::Train(_) => "train".to_string(),
-        Stmt::Let { .. } | Stmt::Feature(_) | Stmt::Light { .. } | Stmt::Field { .. } => String::new(),
+        Stmt::Let { .. } | Stmt::Feature(_) | Stmt::Light { .. } | Stmt::Measure(_) | Stmt::Field { .. } => {
+            String::new()
+        }
     }
 }
 
@@ -157,6 +160,7 @@ fn tail(stmt: &Stmt, layout: Layout) -> String {
     match stmt {
         Stmt::Let { dim: d, .. } => dim(d),
         Stmt::Light { call: c, .. } => call(c, layout),
+        Stmt::Measure(m) => measure(m),
         Stmt::Field { value: v, .. } => value(v),
         Stmt::Feature(f) => feature(f, layout),
         _ => String::new(),
@@ -181,6 +185,12 @@ fn feature(f: &Feature, layout: Layout) -> String {
 fn place(p: &Place) -> String {
     let part = p.part.as_ref().map_or(String::new(), |part| format!(" = {}{}", count(&p.count), part.text));
     format!("place {}{part} on {}", p.name.text, path_text(&p.on))
+}
+
+fn measure(m: &Measure) -> String {
+    let face = |f: &Face| format!("{}.{}", segment_text(&f.component), f.face.text);
+    let within = m.within.as_ref().map_or(String::new(), |d| format!(" within {}", dim(d)));
+    format!("from {} to {}{within}", face(&m.from), face(&m.to))
 }
 
 fn count(count: &Option<Count>) -> String {
@@ -262,7 +272,10 @@ fn unit_text(unit: &Option<Name>) -> String {
 }
 
 fn path_text(p: &Path) -> String {
+    p.segments.iter().map(segment_text).collect::<Vec<_>>().join(".")
+}
+
+fn segment_text(s: &Segment) -> String {
     let index = |i: &Index| i.last.map_or(format!("[{}]", i.first), |last| format!("[{}..{last}]", i.first));
-    let segment = |s: &Segment| format!("{}{}", s.name.text, s.index.as_ref().map_or(String::new(), index));
-    p.segments.iter().map(segment).collect::<Vec<_>>().join(".")
+    format!("{}{}", s.name.text, s.index.as_ref().map_or(String::new(), index))
 }

@@ -125,6 +125,11 @@ fn words(rule: Rule) -> &'static [&'static str] {
         Rule::feature | Rule::op => &["`add`", "`cut`", "`keep`"],
         Rule::root => &["`root`"],
         Rule::place => &["`place`"],
+        Rule::measure => &["`measure`"],
+        Rule::kw_from => &["`from`"],
+        Rule::kw_to => &["`to`"],
+        Rule::within | Rule::kw_within => &["`within`"],
+        Rule::face | Rule::face_dot | Rule::face_name => &["a face such as `plate.slab.top`"],
         Rule::camera => &["`camera`"],
         Rule::light => &["`light`"],
         Rule::floor => &["`floor`"],
@@ -238,6 +243,7 @@ impl Builder {
                 Stmt::Root { name: names[0].clone(), part: names.get(1).cloned() }
             }
             Rule::place => Stmt::Place(Box::new(self.place(inner))),
+            Rule::measure => Stmt::Measure(Box::new(self.measure(inner))),
             Rule::watch => Stmt::Watch {
                 path: self.path(inner.take(Rule::path)),
                 args: inner.find(Rule::args).map(|p| self.args(p)),
@@ -269,6 +275,18 @@ impl Builder {
             on: self.path(inner.take(Rule::path)),
             body: inner.find(Rule::field_body).map(|p| self.body(p)),
         }
+    }
+
+    fn measure(&self, inner: Children) -> Measure {
+        let [from, to] = [0, 1].map(|i| self.face(&inner.all(Rule::face)[i]));
+        let within = inner.find(Rule::within).map(|p| self.dim(Children::of(p).take(Rule::dim)));
+        Measure { name: self.name(&inner.take(Rule::name)), from, to, within }
+    }
+
+    fn face(&self, pair: &Node) -> Face {
+        let inner = Children::of(pair.clone());
+        let component = self.segment(inner.take(Rule::segment));
+        Face { component, face: self.name(&inner.take(Rule::face_name)), span: self.span(pair) }
     }
 
     fn name(&self, pair: &Node) -> Name {
@@ -406,17 +424,19 @@ impl Builder {
 
     fn path(&self, pair: Node) -> Path {
         let span = self.span(&pair);
-        let segment = |p: Node| {
-            let inner = Children::of(p);
-            let index = inner.find(Rule::index).map(|p| {
-                let span = self.span(&p);
-                let mut ends =
-                    Children::of(p).all(Rule::integer).into_iter().map(|p| p.as_str().parse().unwrap_or(u64::MAX));
-                Index { first: ends.next().unwrap_or(0), last: ends.next(), span }
-            });
-            Segment { name: self.name(&inner.take(Rule::name)), index }
-        };
-        Path { segments: Children::of(pair).all(Rule::segment).into_iter().map(segment).collect(), span }
+        let segments = Children::of(pair).all(Rule::segment).into_iter().map(|p| self.segment(p));
+        Path { segments: segments.collect(), span }
+    }
+
+    fn segment(&self, pair: Node) -> Segment {
+        let inner = Children::of(pair);
+        let index = inner.find(Rule::index).map(|p| {
+            let span = self.span(&p);
+            let mut ends =
+                Children::of(p).all(Rule::integer).into_iter().map(|p| p.as_str().parse().unwrap_or(u64::MAX));
+            Index { first: ends.next().unwrap_or(0), last: ends.next(), span }
+        });
+        Segment { name: self.name(&inner.take(Rule::name)), index }
     }
 }
 

@@ -197,7 +197,9 @@ fn starts_block_item(words: &str) -> bool {
 fn starts_statement(words: &str) -> bool {
     let first = words.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next().unwrap_or("");
     let rest = words[first.len()..].trim_start();
-    let keyword = ["add", "cut", "keep", "let", "place", "root", "light", "camera", "vary", "floor", "watch", "ignore"];
+    let keyword = [
+        "add", "cut", "keep", "let", "place", "root", "measure", "light", "camera", "vary", "floor", "watch", "ignore",
+    ];
     (keyword.contains(&first) && rest.starts_with(|c: char| c.is_ascii_alphabetic() || c == '{'))
         || starts_block_item(words)
         || words.starts_with('}')

@@ -343,6 +343,7 @@ mod tests {
             materials: Vec::new(),
             parts: Vec::new(),
             components: (0..components).map(component).collect(),
+            measures: Vec::new(),
             stations: Vec::new(),
             inspect: Inspect {
                 watch: watch.iter().map(|&component| Watch { component, depth: None }).collect(),
