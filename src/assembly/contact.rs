@@ -249,7 +249,7 @@ fn candidate(f: &PlacedFace, g: &PlacedFace) -> Option<Candidate> {
             let opposed = f.outward != g.outward;
             (same && opposed).then_some(Candidate { offset: q - apex, ..round(ContactKind::Cone, *axis, *apex, false) })
         }
-        (Surface::Sphere { centre, radius }, Surface::Sphere { centre: q, radius: s }) => {
+        (Surface::Sphere { centre, radius, .. }, Surface::Sphere { centre: q, radius: s, .. }) => {
             let gap = clearance(f, g, *radius, *s)?;
             let shape = round(ContactKind::Sphere, Vector3::z_axis(), *centre, true);
             Some(Candidate { gap, offset: q - centre, ..shape })

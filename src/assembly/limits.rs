@@ -84,7 +84,9 @@ pub(crate) fn moved(surface: &Surface, pose: &Isometry3<f64>) -> Surface {
         Surface::Cone { apex, axis, half_angle } => {
             Surface::Cone { apex: pose * apex, axis: turn(axis), half_angle: *half_angle }
         }
-        Surface::Sphere { centre, radius } => Surface::Sphere { centre: pose * centre, radius: *radius },
+        Surface::Sphere { centre, radius, axis } => {
+            Surface::Sphere { centre: pose * centre, radius: *radius, axis: turn(axis) }
+        }
         Surface::Torus { centre, axis, major, minor } => {
             Surface::Torus { centre: pose * centre, axis: turn(axis), major: *major, minor: *minor }
         }

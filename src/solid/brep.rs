@@ -263,7 +263,7 @@ fn draft(tree: &Tree, sheet: Sheet, members: &[usize], rings: &[Ring], loops: &[
 /// Spheres that nothing cuts have no edge to be found by: one point decides.
 fn whole_spheres(tree: &Tree, drafts: &[Draft]) -> Vec<Draft> {
     let whole = |(i, surface): (usize, &Surface)| {
-        let Surface::Sphere { centre, radius } = surface else { return None };
+        let Surface::Sphere { centre, radius, .. } = surface else { return None };
         if drafts.iter().any(|d| d.sheet.0 == i) {
             return None;
         }

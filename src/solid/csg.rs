@@ -178,7 +178,7 @@ pub(super) fn coincide(a: &Surface, b: &Surface) -> Option<bool> {
             let same = (r - s).abs() < tolerance::DIRECTION && turned < tolerance::DIRECTION;
             (same && (p - q).norm() < tolerance::POINT).then_some(true)
         }
-        (Sphere { centre: p, radius: r }, Sphere { centre: q, radius: s }) => {
+        (Sphere { centre: p, radius: r, .. }, Sphere { centre: q, radius: s, .. }) => {
             (near(*r, *s) && (p - q).norm() < tolerance::POINT).then_some(true)
         }
         (Torus { centre: p, axis: n, major: a, minor: r }, Torus { centre: q, axis: m, major: b, minor: s }) => {
@@ -342,7 +342,8 @@ impl Sized {
                 sides
             }
             Kind::Ball { radius } => {
-                vec![(Surface::Sphere { centre: self.pose * Point3::origin(), radius }, 1.0, "side")]
+                let axis = Unit::new_normalize(Vector3::new(0.3285, 0.4871, 0.8093));
+                vec![(Surface::Sphere { centre: self.pose * Point3::origin(), radius, axis }, 1.0, "side")]
             }
         }
     }

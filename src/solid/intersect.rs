@@ -35,7 +35,7 @@ pub(super) fn intersect(a: &Surface, b: &Surface) -> Shared {
             cylinders((p, d, *r), (q, e, *s))
         }
         (Torus { .. }, _) | (_, Torus { .. }) => Err(Oblique),
-        (Sphere { centre: p, radius: r }, Sphere { centre: q, radius: s }) => Ok(spheres(p, *r, q, *s)),
+        (Sphere { centre: p, radius: r, .. }, Sphere { centre: q, radius: s, .. }) => Ok(spheres(p, *r, q, *s)),
         (Cylinder { .. } | Cone { .. }, Cone { .. }) | (Cylinder { .. } | Cone { .. }, Sphere { .. }) => coaxial(a, b),
         _ => intersect(b, a),
     }

@@ -94,7 +94,7 @@ fn developed(surface: &Surface, loops: &[Vec<Run>]) -> f64 {
 /// Solid angle of a face of a sphere (Gauss and Bonnet): `2πχ`, less the geodesic curvature along its loops, less the
 /// turns at their corners. χ is 2 less the number of loops.
 fn spherical_angle(surface: &Surface, sense: f64, loops: &[Vec<Run>]) -> f64 {
-    let Surface::Sphere { centre, radius } = surface else { return 0.0 };
+    let Surface::Sphere { centre, radius, .. } = surface else { return 0.0 };
     let bend = |run: &Run| match run.locus {
         Locus::Circle { centre: c, axis, .. } => {
             (c - centre).dot(axis) / radius * (run.span[1] - run.span[0]) * run.way()

@@ -74,6 +74,8 @@ pub enum Surface {
     Sphere {
         centre: Point3<f64>,
         radius: f64,
+        /// Of its chart: a sphere is the same about any axis, so one is chosen whose poles lie far from all edges.
+        axis: Unit<Vector3<f64>>,
     },
     /// A tube of radius `minor` about a circle of radius `major` round the axis. `minor` may exceed `major`, and `major`
     /// may be negative (a barrel: its profile is centred beyond the axis): then only the part whose profile lies on the

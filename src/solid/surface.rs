@@ -20,13 +20,15 @@ pub(super) fn across(axis: &Unit<Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) 
 }
 
 impl Surface {
-    /// Unit vector the surface is built about: the normal of a plane, the axis of a cylinder or cone; for a sphere
-    /// a direction that planes through its centre hardly ever contain, for the chart has its poles there.
+    /// Unit vector the surface is built about: the normal of a plane, the axis of a cylinder, cone or torus, the axis of a
+    /// sphere's chart.
     pub fn axis(&self) -> Unit<Vector3<f64>> {
         match self {
             Surface::Plane { normal, .. } => *normal,
-            Surface::Cylinder { axis, .. } | Surface::Cone { axis, .. } | Surface::Torus { axis, .. } => *axis,
-            Surface::Sphere { .. } => Unit::new_normalize(Vector3::new(0.3285, 0.4871, 0.8093)),
+            Surface::Cylinder { axis, .. }
+            | Surface::Cone { axis, .. }
+            | Surface::Sphere { axis, .. }
+            | Surface::Torus { axis, .. } => *axis,
         }
     }
 
@@ -59,7 +61,7 @@ impl Surface {
                 let (sin, cos) = half_angle.sin_cos();
                 radial(apex, axis, p).norm() * cos - (p - apex).dot(axis) * sin
             }
-            Surface::Sphere { centre, radius } => (p - centre).norm() - radius,
+            Surface::Sphere { centre, radius, .. } => (p - centre).norm() - radius,
             Surface::Torus { centre, axis, major, minor } => {
                 let rho = radial(centre, axis, p).norm();
                 (rho - major).hypot((p - centre).dot(axis)) - minor
@@ -232,7 +234,7 @@ mod tests {
             Surface::Plane { normal: axis, offset: 1.5 },
             Surface::Cylinder { point: p, axis, radius: 2.5 },
             Surface::Cone { apex: p, axis, half_angle: 0.4 },
-            Surface::Sphere { centre: p, radius: 4.0 },
+            Surface::Sphere { centre: p, radius: 4.0, axis },
             Surface::Torus { centre: p, axis, major: 5.0, minor: 2.0 },
             Surface::Torus { centre: p, axis, major: 1.5, minor: 2.0 },
             Surface::Torus { centre: p, axis, major: -3.0, minor: 7.0 },
