@@ -39,7 +39,9 @@ fn primitive_side(shape: &Shape, side: &str, values: &Values) -> Option<Surface>
         (Shape::Cone { d1, d2, h: Extent::Length(h) }, "side") => {
             cone_side(d1.eval(values) / 2.0, d2.eval(values) / 2.0, h.eval(values))
         }
-        (Shape::Sphere { d }, _) => Some(Surface::Sphere { centre: Point3::origin(), radius: d.eval(values) / 2.0 }),
+        (Shape::Sphere { d }, _) => {
+            Some(Surface::Sphere { centre: Point3::origin(), radius: d.eval(values) / 2.0, axis: Vector3::z_axis() })
+        }
         (Shape::Box { x, .. }, "+x" | "-x") => Some(wall(side, Vector3::x(), x.eval(values))),
         (Shape::Box { y, .. }, "+y" | "-y") => Some(wall(side, Vector3::y(), y.eval(values))),
         (_, "bottom") => Some(Surface::Plane { normal: -Vector3::z_axis(), offset: 0.0 }),

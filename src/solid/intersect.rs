@@ -28,7 +28,7 @@ pub(super) fn intersect(a: &Surface, b: &Surface) -> Shared {
         (Plane { normal, .. }, Cone { apex, axis, half_angle }) => {
             plane_cone(normal, a.distance(apex), apex, axis, *half_angle)
         }
-        (Plane { normal, .. }, Sphere { centre, radius }) => {
+        (Plane { normal, .. }, Sphere { centre, radius, .. }) => {
             Ok(plane_sphere(normal, a.distance(centre), centre, *radius))
         }
         (Cylinder { point: p, axis: d, radius: r }, Cylinder { point: q, axis: e, radius: s }) => {
