@@ -166,6 +166,18 @@ pub fn general_linear(class: General, size: f64) -> Option<f64> {
     (size >= SMALLEST && deviation > 0).then(|| f64::from(deviation) / 100.0)
 }
 
+/// Permissible deviation ± in mm of a broken edge: the radius of a rounded corner or the height of a chamfer, in mm. `None`
+/// below 0.5 mm, where the standard wants it stated.
+pub fn general_edge(class: General, size: f64) -> Option<f64> {
+    const LIMITS: [f64; 2] = [3.0, 6.0];
+    const FINE: [f64; 3] = [0.2, 0.5, 1.0];
+    const COARSE: [f64; 3] = [0.4, 1.0, 2.0];
+    const SMALLEST: f64 = 0.5;
+    let row = if matches!(class, General::Fine | General::Medium) { FINE } else { COARSE };
+    let column = LIMITS.iter().position(|&limit| size <= limit).unwrap_or(LIMITS.len());
+    (size >= SMALLEST).then_some(row[column])
+}
+
 /// Permissible deviation ± in rad of an angle whose shorter leg is `leg` mm long.
 pub fn general_angular(class: General, leg: f64) -> f64 {
     const LIMITS: [f64; 4] = [10.0, 50.0, 120.0, 400.0];
@@ -267,6 +279,9 @@ mod tests {
         assert_eq!(general_linear(General::Fine, 6.0), Some(0.05));
         assert_eq!(general_linear(General::VeryCoarse, 2.0), None);
         assert_eq!(general_linear(General::Medium, 0.4), None);
+        assert_eq!(general_edge(General::Medium, 1.0), Some(0.2));
+        assert_eq!(general_edge(General::Coarse, 8.0), Some(2.0));
+        assert_eq!(general_edge(General::Fine, 0.4), None);
         assert!((general_angular(General::Medium, 8.0) - 1f64.to_radians()).abs() < 1e-12);
         assert!((general_angular(General::Coarse, 80.0) - 0.5f64.to_radians()).abs() < 1e-12);
     }

@@ -2,7 +2,7 @@
 
 #![cfg(feature = "cli")]
 
-use gonogo::syntax::ast::{Body, File, Gap, Line, Stmt};
+use gonogo::syntax::ast::{Body, File, Gap, Line, Shape, Stmt};
 use gonogo::syntax::{format, parse};
 use proptest::prelude::*;
 
@@ -31,6 +31,7 @@ fn strip_lines(lines: &mut [Line]) {
         match &mut line.stmt {
             Stmt::Material { body, .. }
             | Stmt::Part { body, .. }
+            | Stmt::Outline { body, .. }
             | Stmt::Assembly { body, .. }
             | Stmt::Station { body, .. }
             | Stmt::Camera { body, .. }
@@ -38,6 +39,11 @@ fn strip_lines(lines: &mut [Line]) {
             | Stmt::Vary(body)
             | Stmt::Inspect { body, .. }
             | Stmt::Train(body) => strip_body(body),
+            Stmt::Feature(feature) => {
+                if let Shape::Group { body, .. } = &mut feature.shape {
+                    strip_body(body);
+                }
+            }
             Stmt::Place(place) => place.body.iter_mut().for_each(strip_body),
             _ => {}
         }

@@ -12,11 +12,11 @@ use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{self, Stmt, Value};
 use crate::units::{Quantity, Range};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 /// More components than this are a slip of the pen.
-const MAX_COMPONENTS: usize = 1000;
+const MAX_COMPONENTS: usize = 4096;
 
 const AXES: [(&str, Quantity); 6] = [
     ("x", Quantity::Length),
@@ -41,7 +41,7 @@ pub struct Assembled {
     /// Components by the name they were placed under: `alignment_pin` names three.
     pub groups: BTreeMap<String, Vec<usize>>,
     /// Names of the parts that were placed.
-    pub placed: Vec<String>,
+    pub placed: BTreeSet<String>,
 }
 
 /// What one placement stands on: a component and the frame of one of its features.
@@ -169,7 +169,7 @@ impl Resolver {
         let path = if several { component } else { &wanted.text };
         let part = self.part(*source, path, &catalogue.materials);
         built.parts.push(part);
-        built.placed.push(wanted.text.clone());
+        built.placed.insert(wanted.text.clone());
         Some(built.parts.len() - 1)
     }
 

@@ -27,6 +27,8 @@ const UNKNOWN_LEG: f64 = 10.0;
 pub enum General {
     /// The file's general tolerance: sizes.
     Applies,
+    /// That of broken edges: radii of rounded corners, chamfers.
+    Edge,
     /// Exact: positions, patterns, stations.
     Basic,
 }
@@ -74,6 +76,10 @@ impl Resolver {
 
     /// A named dimension. Without a unit it is a length.
     pub fn named_value(&mut self, named: &Named, usage: Use) -> Option<Typed> {
+        if named.dim.each {
+            let message = "`each` belongs to a dimension of a feature, and a name is one dimension for all";
+            self.report(Diagnostic::error("E0211", named.dim.span, message).label("not here"));
+        }
         let typed = self.value(&named.dim, usage, General::Applies, &named.path, None)?;
         let quantity = typed.quantity.unwrap_or(Quantity::Length);
         let expr = self.coerce(typed, quantity, named.dim.span)?;
@@ -103,7 +109,8 @@ impl Resolver {
         let scale = self.bare_scale(limited.quantity, quantity, dim.span)?;
         let range = Range { low: low * scale, nominal: nominal * scale, high: high * scale };
         let range = self.in_bounds(range, dim.span)?;
-        let remark = Remark { states: limited.remark.states.map(|s| s.map(|v| v * scale)), ..limited.remark };
+        let states = limited.remark.states.map(|s| s.map(|v| v * scale));
+        let remark = Remark { states, each: dim.each, ..limited.remark };
         Some(Typed {
             expr: self.new_dim(name.to_string(), quantity, range, remark, dim.span),
             quantity: Some(quantity),
@@ -202,7 +209,7 @@ impl Resolver {
             }
         };
         let range = Range::about(nominal, nominal + low, nominal + high);
-        let remark = Remark { states: None, fit: Some((class.text.clone(), class.span)) };
+        let remark = Remark { fit: Some((class.text.clone(), class.span)), ..Remark::default() };
         Some(Limited { range, quantity: Some(Quantity::Length), remark })
     }
 
@@ -259,7 +266,7 @@ impl Resolver {
             );
             return None;
         }
-        let remark = Remark { states: Some([mmc, lmc]), fit: None };
+        let remark = Remark { states: Some([mmc, lmc]), ..Remark::default() };
         Some(Limited { range: Range { low, nominal, high }, quantity, remark })
     }
 
@@ -272,11 +279,14 @@ impl Resolver {
     ) -> Option<Range> {
         let title = self.title(dim.span);
         let bare = matches!(&dim.size, Size::Quantity(q) if q.unit.is_none());
-        let (Some(class), General::Applies) = (title.general, general) else { return Some(Range::exactly(nominal)) };
+        let Some(class) = title.general.filter(|_| general != General::Basic) else {
+            return Some(Range::exactly(nominal));
+        };
         match quantity.unwrap_or(Quantity::Length) {
             Quantity::Length => {
                 let scale = if bare { title.length } else { 1.0 };
-                let Some(deviation) = iso::general_linear(class, nominal.abs() * scale) else {
+                let table = if general == General::Edge { iso::general_edge } else { iso::general_linear };
+                let Some(deviation) = table(class, nominal.abs() * scale) else {
                     let message = format!("ISO 2768 has no general tolerance for {} mm", nominal * scale);
                     self.report(
                         Diagnostic::error("E0303", dim.span, message)
@@ -424,8 +434,7 @@ impl Resolver {
 
     /// Refuses arithmetic that has no value at nominal.
     fn finite(&mut self, expr: Expr, span: Span) -> Option<Expr> {
-        let values: Vec<f64> = self.dims.iter().map(|d| d.range.nominal).collect();
-        let value = expr.eval(&values);
+        let value = expr.eval(&self.nominal);
         self.in_bounds(Range::exactly(value), span).map(|_| expr)
     }
 

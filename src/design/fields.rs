@@ -4,6 +4,7 @@
 //! unknown, given twice or missing.
 
 use super::dimension::General;
+use super::feature::Names;
 use super::model::Expr;
 use super::scope::Resolver;
 use crate::diag::suggest::nearest;
@@ -196,10 +197,10 @@ impl Resolver {
     }
 
     /// Three expressions; two coordinates have z = 0.
-    pub fn point_exprs(&mut self, point: &Point, want: Quantity, name: &str) -> Option<[Expr; 3]> {
+    pub fn point_exprs(&mut self, point: &Point, want: Quantity, names: &Names) -> Option<[Expr; 3]> {
         let mut exprs = Vec::new();
         for (dim, axis) in point_dims(point).iter().zip(["x", "y", "z"]) {
-            exprs.push(self.dimension(dim, want, General::Basic, &format!("{name}.{axis}")));
+            exprs.push(self.dimension(dim, want, General::Basic, &names.of(axis, dim.each)));
         }
         let mut exprs = exprs.into_iter();
         let [x, y] = [exprs.next()??, exprs.next()??];
@@ -209,7 +210,7 @@ impl Resolver {
 }
 
 /// The coordinates, each with the unit behind the parentheses unless it has its own.
-fn point_dims(point: &Point) -> Vec<Dim> {
+pub fn point_dims(point: &Point) -> Vec<Dim> {
     let with_unit = |dim: &Dim| {
         let mut dim = dim.clone();
         if let (crate::syntax::ast::Size::Quantity(q), Some(unit)) = (&mut dim.size, &point.unit)

@@ -419,24 +419,23 @@ impl Resolver {
 
     /// Parts that are placed nowhere are still checked, on a copy of the stage that is thrown away.
     fn unplaced(&mut self, blocks: &Blocks, catalogue: &Catalogue, built: &Assembled) {
-        for (source, used) in &blocks.parts {
-            if built.placed.contains(&source.name.text) {
-                continue;
-            }
-            let mut scratch = self.clone();
-            let part = scratch.part(*source, &source.name.text, &catalogue.materials);
-            scratch.senses(std::slice::from_ref(&part));
-            self.diagnostics = scratch.diagnostics;
-            (self.used, self.used_materials) = (scratch.used, scratch.used_materials);
+        let mut scratch = self.clone();
+        let mut parts = Vec::new();
+        let idle = blocks.parts.iter().filter(|(source, _)| !built.placed.contains(&source.name.text));
+        for (source, used) in idle {
+            parts.push(scratch.part(*source, &source.name.text, &catalogue.materials));
             if !used && blocks.assembly.is_some() {
                 let message = format!("part `{}` is never placed", source.name.text);
-                self.report(
+                scratch.report(
                     Diagnostic::warning("W0209", source.name.span, message)
                         .label("not used")
                         .help("place it or remove it"),
                 );
             }
         }
+        scratch.senses(&parts);
+        self.diagnostics = scratch.diagnostics;
+        (self.used, self.used_materials) = (scratch.used, scratch.used_materials);
     }
 
     fn warn_unused(&mut self, blocks: &Blocks) {

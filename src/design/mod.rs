@@ -5,15 +5,21 @@
 
 mod assemble;
 mod dimension;
+mod feature;
 mod fields;
+mod hole;
+mod interval;
 mod load;
 mod material;
 mod measure;
 pub mod model;
+mod outline;
 mod part;
 mod pattern;
+mod profile;
 mod scope;
 mod sense;
+mod shape;
 mod station;
 mod sum;
 mod task;

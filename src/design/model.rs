@@ -155,6 +155,27 @@ pub enum Shape {
     },
 }
 
+impl Shape {
+    /// Every expression of a primitive; none of a group, whose features have their own.
+    pub fn exprs(&self) -> Vec<&Expr> {
+        let (mut sizes, outline, extent) = match self {
+            Shape::Box { x, y, z } => (vec![x, y], None, Some(z)),
+            Shape::Cylinder { d, h } => (vec![d], None, Some(h)),
+            Shape::Cone { d1, d2, h } => (vec![d1, d2], None, Some(h)),
+            Shape::Sphere { d } => (vec![d], None, None),
+            Shape::Torus { d, tube } => (vec![d, tube], None, None),
+            Shape::Prism { outline, h } => (vec![], Some(outline), Some(h)),
+            Shape::Revolve { outline } => (vec![], Some(outline), None),
+            Shape::Group { .. } => (vec![], None, None),
+        };
+        sizes.extend(outline.into_iter().flat_map(Outline::exprs));
+        if let Some(Extent::Length(length)) = extent {
+            sizes.push(length);
+        }
+        sizes
+    }
+}
+
 /// A closed outline in a plane, mm: from `start` along its sides; a straight side leads back to `start` where the last
 /// side does not end there. Either way round; it may not cross or touch itself.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -162,6 +183,20 @@ pub struct Outline {
     pub start: [Expr; 2],
     pub start_corner: Corner,
     pub sides: Vec<OutlineSide>,
+}
+
+impl Outline {
+    /// Every coordinate, radius and size of a corner.
+    pub fn exprs(&self) -> Vec<&Expr> {
+        let mut exprs: Vec<&Expr> = self.start.iter().chain(self.start_corner.size()).collect();
+        for side in &self.sides {
+            exprs.extend(side.to.iter().chain(side.corner.size()));
+            if let OutlinePath::Arc { radius, .. } = &side.path {
+                exprs.push(radius);
+            }
+        }
+        exprs
+    }
 }
 
 /// One side of an outline, from where the one before it ended.
@@ -194,6 +229,15 @@ pub enum Corner {
     Round(Expr),
     /// Cut off at this distance from the corner on both sides.
     Chamfer(Expr),
+}
+
+impl Corner {
+    pub fn size(&self) -> Option<&Expr> {
+        match self {
+            Corner::Sharp => None,
+            Corner::Round(size) | Corner::Chamfer(size) => Some(size),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

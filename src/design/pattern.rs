@@ -4,9 +4,10 @@
 //! numbered in reading order, from -x to +x and from +y down to -y.
 
 use super::dimension::General;
+use super::feature::{Frame, Names};
 use super::fields::Fields;
+use super::interval::{half, times};
 use super::model::Expr;
-use super::part::Frame;
 use super::scope::Resolver;
 use crate::diag::Diagnostic;
 use crate::syntax::ast::{self, Value};
@@ -15,7 +16,7 @@ use std::f64::consts::TAU;
 
 impl Resolver {
     /// A frame per copy; `None` when the pattern is wrong.
-    pub fn pattern(&mut self, feature: &ast::Feature, count: u64, path: &str) -> Option<Vec<Frame>> {
+    pub fn pattern(&mut self, feature: &ast::Feature, count: u64, names: &Names) -> Option<Vec<Frame>> {
         match (&feature.on, &feature.count) {
             (None, None) => Some(vec![Frame { offset: [Expr::Const(0.0), Expr::Const(0.0)], angle: 0.0 }]),
             (None, Some(times)) => {
@@ -27,16 +28,16 @@ impl Resolver {
                 );
                 None
             }
-            (Some(call), _) => self.frames(call, count, &format!("{path}.{}", call.name.text)),
+            (Some(call), _) => self.frames(call, count, &names.child(&call.name.text)),
         }
     }
 
-    fn frames(&mut self, call: &ast::Call, count: u64, path: &str) -> Option<Vec<Frame>> {
+    fn frames(&mut self, call: &ast::Call, count: u64, names: &Names) -> Option<Vec<Frame>> {
         let fields = Fields::of_args(&call.name, &call.args);
         match call.name.text.as_str() {
-            "circle" => self.circle(&fields, count, path),
-            "line" => self.line(&fields, count, path),
-            "grid" => self.grid(&fields, count, path),
+            "circle" => self.circle(&fields, count, names),
+            "line" => self.line(&fields, count, names),
+            "grid" => self.grid(&fields, count, names),
             other => {
                 let message = format!("no pattern is named `{other}`");
                 self.report(
@@ -49,14 +50,11 @@ impl Resolver {
         }
     }
 
-    fn circle(&mut self, fields: &Fields, count: u64, path: &str) -> Option<Vec<Frame>> {
+    fn circle(&mut self, fields: &Fields, count: u64, names: &Names) -> Option<Vec<Frame>> {
         self.check_fields(fields, &["d", "r", "from", "step"]);
         let radius = match (fields.get("r"), fields.get("d")) {
-            (Some(_), _) => self.location(fields, "r", path)?,
-            (None, Some(_)) => match self.location(fields, "d", path)? {
-                Expr::Const(d) => Expr::Const(d / 2.0),
-                d => Expr::Div(Box::new(d), Box::new(Expr::Const(2.0))),
-            },
+            (Some(_), _) => self.location(fields, "r", names)?,
+            (None, Some(_)) => half(&self.location(fields, "d", names)?),
             (None, None) => {
                 self.missing(fields, "d", "36 basic");
                 return None;
@@ -72,13 +70,13 @@ impl Resolver {
         Some((0..count).map(frame).collect())
     }
 
-    fn line(&mut self, fields: &Fields, count: u64, path: &str) -> Option<Vec<Frame>> {
+    fn line(&mut self, fields: &Fields, count: u64, names: &Names) -> Option<Vec<Frame>> {
         self.check_fields(fields, &["pitch", "angle"]);
         if fields.get("pitch").is_none() {
             self.missing(fields, "pitch", "10");
             return None;
         }
-        let pitch = self.location(fields, "pitch", path)?;
+        let pitch = self.location(fields, "pitch", names)?;
         let angle = self.exact_or(fields, "angle", Quantity::Angle, 0.0, [f64::MIN, f64::MAX]);
         let frame = |i: u64| {
             let [x, y] = [angle.cos() * i as f64, angle.sin() * i as f64];
@@ -87,7 +85,7 @@ impl Resolver {
         Some((0..count).map(frame).collect())
     }
 
-    fn grid(&mut self, fields: &Fields, count: u64, path: &str) -> Option<Vec<Frame>> {
+    fn grid(&mut self, fields: &Fields, count: u64, names: &Names) -> Option<Vec<Frame>> {
         self.check_fields(fields, &["columns", "x", "y"]);
         for (key, example) in [("columns", "2"), ("x", "10"), ("y", "10")] {
             if fields.get(key).is_none() {
@@ -97,7 +95,7 @@ impl Resolver {
         }
         let columns = self.whole_or(fields, "columns", count, [1, count]);
         let rows = count.div_ceil(columns);
-        let (x, y) = (self.location(fields, "x", path)?, self.location(fields, "y", path)?);
+        let (x, y) = (self.location(fields, "x", names)?, self.location(fields, "y", names)?);
         let frame = |i: u64| {
             let across = (i % columns) as f64 - (columns - 1) as f64 / 2.0;
             let down = (i / columns) as f64 - (rows - 1) as f64 / 2.0;
@@ -106,7 +104,7 @@ impl Resolver {
         Some((0..count).map(frame).collect())
     }
 
-    fn location(&mut self, fields: &Fields, key: &str, path: &str) -> Option<Expr> {
+    fn location(&mut self, fields: &Fields, key: &str, names: &Names) -> Option<Expr> {
         let dim = match fields.get(key)? {
             Value::Dim(dim) => dim,
             other => {
@@ -114,18 +112,6 @@ impl Resolver {
                 return None;
             }
         };
-        self.dimension(dim, Quantity::Length, General::Basic, &format!("{path}.{key}"))
-    }
-}
-
-/// A product with a constant, folded where it can be. Cosines of right angles are exact.
-fn times(expr: &Expr, factor: f64) -> Expr {
-    /// Below this a cosine is that of a right angle.
-    const RIGHT_ANGLE: f64 = 1e-15;
-    let factor = if factor.abs() < RIGHT_ANGLE { 0.0 } else { factor };
-    match expr {
-        Expr::Const(v) => Expr::Const(v * factor),
-        _ if factor == 0.0 => Expr::Const(0.0),
-        expr => Expr::Mul(Box::new(expr.clone()), Box::new(Expr::Const(factor))),
+        self.dimension(dim, Quantity::Length, General::Basic, &names.of(key, dim.each))
     }
 }

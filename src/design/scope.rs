@@ -3,6 +3,7 @@
 //! In: syntax trees. Out: a [`Resolver`] that the other files of this stage extend with their own kind of statement.
 
 use super::model::{DimId, Dimension, Expr, Sense};
+use super::outline::Drawn;
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::iso::General;
@@ -69,6 +70,8 @@ pub struct Remark {
     pub states: Option<[f64; 2]>,
     /// The fit class as stated.
     pub fit: Option<(String, Span)>,
+    /// Every copy of a pattern has its own.
+    pub each: bool,
 }
 
 /// The stage at work.
@@ -88,6 +91,12 @@ pub struct Resolver {
     pub dims: Vec<Dimension>,
     /// One per dimension.
     pub remarks: Vec<Remark>,
+    /// The nominal value of every dimension.
+    pub nominal: Vec<f64>,
+    /// The outlines of the part at hand.
+    pub outlines: BTreeMap<String, Drawn>,
+    /// Features of all parts so far, copies counted.
+    pub features_in_all: u64,
     pub diagnostics: Vec<Diagnostic>,
     /// Names being evaluated, outermost first.
     chain: Vec<(String, Span)>,
@@ -117,6 +126,7 @@ impl Resolver {
     pub fn new_dim(&mut self, name: String, quantity: Quantity, range: Range, remark: Remark, span: Span) -> Expr {
         let id = DimId(self.dims.len() as u32);
         let nominal = range.nominal;
+        self.nominal.push(nominal);
         self.dims.push(Dimension { name, quantity, range, sense: Sense::Neutral, mmc: nominal, lmc: nominal, span });
         self.remarks.push(remark);
         Expr::Dim(id)

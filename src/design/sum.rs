@@ -10,6 +10,9 @@ use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::Sum;
 use crate::units::Quantity;
 
+/// Larger expressions are a slip of the pen: names that are sums of names grow by powers of two.
+const MAX_TERMS: usize = 1000;
+
 impl Resolver {
     /// The value of what stands inside parentheses.
     pub fn sum(&mut self, sum: &Sum, usage: Use) -> Option<Typed> {
@@ -29,6 +32,13 @@ impl Resolver {
     }
 
     fn binary(&mut self, sign: char, a: Typed, b: Typed, span: Span) -> Option<Typed> {
+        if terms(&a.expr) + terms(&b.expr) > MAX_TERMS {
+            let message = format!("this sum has more than {MAX_TERMS} terms, those behind its names counted");
+            self.report(
+                Diagnostic::error("E0212", span, message).label("too long").help("give one of its names a number"),
+            );
+            return None;
+        }
         let quantity = match (sign, a.quantity, b.quantity) {
             ('+' | '-', x, y) if x == y => x,
             ('+' | '-', Some(q), None) | ('+' | '-', None, Some(q)) => Some(q),
@@ -59,6 +69,15 @@ impl Resolver {
             _ => Expr::Div(a, b),
         };
         Some(Typed { expr: folded(expr), quantity })
+    }
+}
+
+/// Leaves of the expression.
+fn terms(expr: &Expr) -> usize {
+    match expr {
+        Expr::Const(_) | Expr::Dim(_) => 1,
+        Expr::Neg(a) => terms(a),
+        Expr::Add(a, b) | Expr::Sub(a, b) | Expr::Mul(a, b) | Expr::Div(a, b) => terms(a) + terms(b),
     }
 }
 

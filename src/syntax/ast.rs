@@ -63,6 +63,16 @@ pub enum Stmt {
         body: Body,
     },
     Feature(Box<Feature>),
+    Outline {
+        name: Name,
+        body: Body,
+    },
+    /// `from (0, 0)`: where an outline begins.
+    Start {
+        at: Point,
+        corner: Option<Corner>,
+    },
+    Side(Box<Side>),
     Assembly {
         name: Name,
         body: Body,
@@ -119,10 +129,65 @@ pub struct Feature {
     pub op: Name,
     pub name: Name,
     pub count: Option<Count>,
-    pub shape: Call,
+    pub shape: Shape,
     pub at: Option<Point>,
     pub turn: Option<Point>,
     pub on: Option<Call>,
+}
+
+/// What is added or cut.
+#[derive(Debug, Clone, Serialize)]
+pub enum Shape {
+    Call(Call),
+    /// `group { … }`, with the place of the word.
+    Group {
+        word: Name,
+        body: Body,
+    },
+}
+
+impl Shape {
+    /// `cylinder`, `group`.
+    pub fn word(&self) -> &Name {
+        match self {
+            Shape::Call(call) => &call.name,
+            Shape::Group { word, .. } => word,
+        }
+    }
+}
+
+/// `line base to (40, 0) round 3`
+#[derive(Debug, Clone, Serialize)]
+pub struct Side {
+    pub name: Option<Name>,
+    pub to: Point,
+    /// `None` for a line.
+    pub arc: Option<Arc>,
+    pub corner: Option<Corner>,
+}
+
+/// `radius 10 left long`
+#[derive(Debug, Clone, Serialize)]
+pub struct Arc {
+    pub radius: Dim,
+    /// `left` or `right`.
+    pub hand: Name,
+    pub long: bool,
+}
+
+/// `round 3`, `chamfer 1`
+#[derive(Debug, Clone, Serialize)]
+pub struct Corner {
+    pub kind: CornerKind,
+    pub size: Dim,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum CornerKind {
+    Round,
+    Chamfer,
 }
 
 /// `place pin = 3x pin on plate.bore { … }`

@@ -29,6 +29,11 @@ pub fn describe(text: &str, fault: &Fault, file: u32, offset: usize) -> Diagnost
     // Inside a token that takes no blanks the parser stops before them; the reader looks at what follows.
     let at = text.len() - text[fault.at..].trim_start_matches([' ', '\t']).len();
     let found = token_at(text, at);
+    if let Some((at, word, meant)) = misspelt_before(text, at, &fault.expected) {
+        let message = format!("expected {}, found `{word}`", list(&fault.expected));
+        let help = format!("did you mean `{meant}`?");
+        return Diagnostic::error("E0101", span(at, word.len()), message).label("not expected here").help(help);
+    }
     let message = format!("expected {}, found {}", list(&fault.expected), spoken(found));
     let diagnostic = Diagnostic::error("E0101", span(at, found.trim_end().len()), message).label("not expected here");
     match keyword_meant(found, &fault.expected) {
@@ -45,6 +50,17 @@ fn bare_feature(text: &str, at: usize) -> Option<(usize, &str)> {
     let word = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     let bare = text[at..].starts_with('(') && word(name.trim()) && word(shape.trim());
     bare.then(|| (line_start + indent, name.trim()))
+}
+
+/// The word before `at`, if it was read as a unit but is nearly a keyword that is expected.
+fn misspelt_before<'t>(text: &'t str, at: usize, expected: &[&str]) -> Option<(usize, &'t str, String)> {
+    let before = text[..at].trim_end_matches([' ', '\t']);
+    let start = before.trim_end_matches(|c: char| c.is_ascii_alphabetic()).len();
+    let word = &before[start..];
+    let is_unit = before[..start].trim_end().ends_with(|c: char| c == ')' || c.is_ascii_digit());
+    let keywords = expected.iter().filter_map(|w| w.strip_prefix('`')?.strip_suffix('`')).filter(|w| w.len() > 2);
+    let meant = nearest(word, keywords)?;
+    (is_unit && word.len() > 2).then(|| (start, word, meant.to_string()))
 }
 
 struct Slip {

@@ -103,6 +103,7 @@ fn body(stmt: &Stmt) -> Option<&Body> {
     match stmt {
         Stmt::Material { body, .. }
         | Stmt::Part { body, .. }
+        | Stmt::Outline { body, .. }
         | Stmt::Assembly { body, .. }
         | Stmt::Station { body, .. }
         | Stmt::Camera { body, .. }
@@ -111,6 +112,10 @@ fn body(stmt: &Stmt) -> Option<&Body> {
         | Stmt::Inspect { body, .. }
         | Stmt::Train(body) => Some(body),
         Stmt::Place(place) => place.body.as_ref(),
+        Stmt::Feature(feature) => match &feature.shape {
+            Shape::Group { body, .. } => Some(body),
+            Shape::Call(_) => None,
+        },
         _ => None,
     }
 }
@@ -136,6 +141,9 @@ fn head_and_tail(stmt: &Stmt, width: usize, layout: Layout) -> String {
         Stmt::Use(file) => format!("use \"{}\"", file.text),
         Stmt::Material { name, .. } => named("material", name),
         Stmt::Part { name, .. } => named("part", name),
+        Stmt::Outline { name, .. } => named("outline", name),
+        Stmt::Start { at, corner: c } => format!("from {}{}", point(at), corner(c)),
+        Stmt::Side(s) => side(s),
         Stmt::Assembly { name, .. } => named("assembly", name),
         Stmt::Station { name, .. } => named("station", name),
         Stmt::Root { name, part } => {
@@ -168,7 +176,11 @@ fn tail(stmt: &Stmt, layout: Layout) -> String {
 }
 
 fn feature(f: &Feature, layout: Layout) -> String {
-    let mut text = format!("{}{}", count(&f.count), call(&f.shape, layout));
+    let shape = match &f.shape {
+        Shape::Call(c) => call(c, layout),
+        Shape::Group { word, .. } => word.text.clone(),
+    };
+    let mut text = format!("{}{shape}", count(&f.count));
     if let Some(at) = &f.at {
         text += &format!(" at {}", point(at));
     }
@@ -180,6 +192,23 @@ fn feature(f: &Feature, layout: Layout) -> String {
         text += &format!(" on {}", call(on, Layout::Flat));
     }
     text
+}
+
+fn side(s: &Side) -> String {
+    let word = if s.arc.is_some() { "arc" } else { "line" };
+    let name = s.name.as_ref().map_or(String::new(), |n| format!(" {}", n.text));
+    let bend = s.arc.as_ref().map_or(String::new(), |arc| {
+        let long = if arc.long { " long" } else { "" };
+        format!(" radius {} {}{long}", dim(&arc.radius), arc.hand.text)
+    });
+    format!("{word}{name} to {}{bend}{}", point(&s.to), corner(&s.corner))
+}
+
+fn corner(c: &Option<Corner>) -> String {
+    c.as_ref().map_or(String::new(), |c| {
+        let word = if c.kind == CornerKind::Round { "round" } else { "chamfer" };
+        format!(" {word} {}", dim(&c.size))
+    })
 }
 
 fn place(p: &Place) -> String {

@@ -8,6 +8,9 @@ use crate::diag::{Diagnostic, Span};
 /// Parentheses nested deeper than this are refused, which bounds the parser's recursion.
 pub const MAX_NESTING: usize = 32;
 
+/// More operators than this inside one pair of parentheses are refused: a sum is as deep as it is long.
+const MAX_OPERATORS: usize = 300;
+
 /// A stretch of the text that holds one item and the comments above it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Chunk {
@@ -36,6 +39,7 @@ struct Open {
     bracket: u8,
     at: usize,
     indent: usize,
+    operators: usize,
 }
 
 struct Scanner<'a> {
@@ -71,11 +75,23 @@ impl Scanner<'_> {
     fn brackets(&mut self, start: usize, code: &str, indent: usize) {
         for (at, byte) in outside_strings(code) {
             match byte {
-                b'(' | b'{' => self.open(Open { bracket: byte, at: start + at, indent }),
+                b'(' | b'{' => self.open(Open { bracket: byte, at: start + at, indent, operators: 0 }),
                 b')' => self.close(b'(', start + at, None),
                 b'}' => self.close(b'{', start + at, code[..at].trim().is_empty().then_some(indent)),
+                b'+' | b'-' | b'*' | b'/' => self.operator(),
                 _ => {}
             }
+        }
+    }
+
+    fn operator(&mut self) {
+        let Some(open) = self.open.last_mut() else { return };
+        open.operators += 1;
+        if open.bracket == b'(' && open.operators == MAX_OPERATORS {
+            let at = open.at;
+            let message = format!("more than {MAX_OPERATORS} operators stand in these parentheses");
+            let help = "name parts of the sum with `let`";
+            self.report(Diagnostic::error("E0212", self.span(at, 1), message).label("opened here").help(help));
         }
     }
 
@@ -198,7 +214,8 @@ fn starts_statement(words: &str) -> bool {
     let first = words.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next().unwrap_or("");
     let rest = words[first.len()..].trim_start();
     let keyword = [
-        "add", "cut", "keep", "let", "place", "root", "measure", "light", "camera", "vary", "floor", "watch", "ignore",
+        "add", "cut", "keep", "let", "place", "root", "measure", "outline", "line", "arc", "light", "camera", "vary",
+        "floor", "watch", "ignore",
     ];
     (keyword.contains(&first) && rest.starts_with(|c: char| c.is_ascii_alphabetic() || c == '{'))
         || starts_block_item(words)

@@ -1,170 +1,14 @@
-//! Text to tree. The only file that knows the parser generator.
-//!
-//! Each item is parsed by itself. When one does not parse, the fault is reported, the statement that holds it is blanked
-//! out, and the item is tried again, so that one run reports several faults of one block.
+//! From what the parser generator found to nodes of the syntax tree.
 
-use super::ast::*;
-use super::faults::{self, Fault};
-use super::scan::{scan, strip_comment};
-use crate::diag::{Diagnostic, Span};
-use pest::Parser;
+use super::Rule;
+use crate::diag::Span;
+use crate::syntax::ast::*;
 use pest::iterators::Pair;
-use std::borrow::Cow;
-
-/// A spec longer than this is a mistake (bytes).
-const MAX_TEXT: usize = 1 << 20;
-/// Faults reported per item, and per file.
-const MAX_FAULTS_PER_ITEM: usize = 8;
-const MAX_FAULTS: usize = 40;
-
-#[derive(pest_derive::Parser)]
-#[grammar = "grammar/gonogo.pest"]
-struct Grammar;
-
-/// The tree of `text`, without what could not be read, and why that could not be read. `file` is the text's index in
-/// [`crate::diag::Sources`].
-pub fn parse(text: &str, file: u32) -> (File, Vec<Diagnostic>) {
-    if text.len() > MAX_TEXT {
-        let message = format!("this file has {} bytes, the limit is {MAX_TEXT}", text.len());
-        return (File::default(), vec![Diagnostic::error("E0101", Span { file, start: 0, end: 0 }, message)]);
-    }
-    let (chunks, mut diagnostics) = scan(text, file);
-    let mut tree = File::default();
-    for chunk in chunks.iter().filter(|chunk| !chunk.broken) {
-        let builder = Builder { file, offset: chunk.start };
-        tree.lines.extend(parse_chunk(&text[chunk.start..chunk.end], &builder, &mut diagnostics));
-    }
-    tree.end = parse_tail(&text[chunks.last().map_or(0, |chunk| chunk.end)..]);
-    diagnostics.sort_by_key(|d| d.labels[0].span.start);
-    diagnostics.truncate(MAX_FAULTS);
-    (tree, diagnostics)
-}
-
-fn parse_chunk(text: &str, builder: &Builder, diagnostics: &mut Vec<Diagnostic>) -> Option<Line> {
-    let mut text = Cow::Borrowed(text.strip_prefix('\u{feff}').unwrap_or(text));
-    for _ in 0..MAX_FAULTS_PER_ITEM {
-        let error = match Grammar::parse(Rule::chunk, &text) {
-            Ok(mut pairs) => return builder.lines(pairs.next()?).0.pop(),
-            Err(error) => error,
-        };
-        let fault = fault(&error);
-        diagnostics.push(faults::describe(&text, &fault, builder.file, builder.offset));
-        text = Cow::Owned(without_statement(&text, fault.at)?);
-    }
-    None
-}
-
-/// The comments and blank lines behind the last item.
-fn parse_tail(text: &str) -> Vec<Gap> {
-    let comment = |line: &str| match line.trim() {
-        "" => Gap::Blank,
-        words => Gap::Comment(words.to_string()),
-    };
-    // The first line is the rest of the line of the last item.
-    text.lines().skip(usize::from(text.starts_with(['\n', '\r']))).map(comment).collect()
-}
-
-fn fault(error: &pest::error::Error<Rule>) -> Fault {
-    let at = match error.location {
-        pest::error::InputLocation::Pos(at) | pest::error::InputLocation::Span((at, _)) => at,
-    };
-    let mut expected: Vec<&'static str> = match &error.variant {
-        pest::error::ErrorVariant::ParsingError { positives, .. } => {
-            positives.iter().flat_map(|r| words(*r)).copied().collect()
-        }
-        pest::error::ErrorVariant::CustomError { .. } => Vec::new(),
-    };
-    let mut seen = std::collections::BTreeSet::new();
-    expected.retain(|word| seen.insert(*word));
-    Fault { at, expected }
-}
-
-/// The text with the statement at `at` replaced by spaces; `None` if that would tear a block open.
-fn without_statement(text: &str, at: usize) -> Option<String> {
-    let (start, end) = statement_at(text, at);
-    let statement = &text[start..end];
-    let code: String = statement.lines().map(strip_comment).collect();
-    if code.trim().is_empty() || code.matches('{').count() != code.matches('}').count() || code.contains('"') {
-        return None;
-    }
-    let blank: String = statement.bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }).collect();
-    Some(format!("{}{blank}{}", &text[..start], &text[end..]))
-}
-
-/// Start and end of the lines of the statement at `at`: lines joined by open parentheses are one statement.
-fn statement_at(text: &str, at: usize) -> (usize, usize) {
-    let (mut start, mut end, mut depth) = (0, 0, 0i32);
-    for line in text.split_inclusive('\n') {
-        if depth <= 0 {
-            (start, depth) = (end, 0);
-        }
-        end += line.len();
-        let code = strip_comment(line);
-        depth += code.matches('(').count() as i32 - code.matches(')').count() as i32;
-        if at < end && depth <= 0 {
-            break;
-        }
-    }
-    (start, end)
-}
-
-/// What a rule is called in a message; nothing for what goes without saying.
-fn words(rule: Rule) -> &'static [&'static str] {
-    match rule {
-        Rule::version => &["`gonogo 1`"],
-        Rule::units => &["`units`"],
-        Rule::general => &["`tolerances`"],
-        Rule::use_file => &["`use`"],
-        Rule::let_dim => &["`let`"],
-        Rule::material => &["`material`"],
-        Rule::part => &["`part`"],
-        Rule::assembly => &["`assembly`"],
-        Rule::station => &["`station`"],
-        Rule::inspect => &["`inspect`"],
-        Rule::train => &["`train`"],
-        Rule::feature | Rule::op => &["`add`", "`cut`", "`keep`"],
-        Rule::root => &["`root`"],
-        Rule::place => &["`place`"],
-        Rule::measure => &["`measure`"],
-        Rule::kw_from => &["`from`"],
-        Rule::kw_to => &["`to`"],
-        Rule::within | Rule::kw_within => &["`within`"],
-        Rule::face | Rule::face_dot | Rule::face_name => &["a face such as `plate.slab.top`"],
-        Rule::camera => &["`camera`"],
-        Rule::light => &["`light`"],
-        Rule::floor => &["`floor`"],
-        Rule::vary => &["`vary`"],
-        Rule::watch => &["`watch`"],
-        Rule::ignore => &["`ignore`"],
-        Rule::on | Rule::kw_on => &["`on`"],
-        Rule::at | Rule::kw_at => &["`at`"],
-        Rule::turn | Rule::kw_turn => &["`turn`"],
-        Rule::mode => &["`fixed`", "`auto`"],
-        Rule::each => &["`each`"],
-        Rule::field | Rule::arg => &["`name = value`"],
-        Rule::key | Rule::name | Rule::path | Rule::segment => &["a name"],
-        Rule::word | Rule::call => &["a word"],
-        Rule::class => &["`ISO2768-m`", "`exact`"],
-        Rule::value | Rule::dim => &["a value"],
-        Rule::number | Rule::quantity | Rule::integer => &["a number"],
-        Rule::string => &["a file name in quotes"],
-        Rule::point => &["a point `(x, y, z)`"],
-        Rule::args => &["arguments in parentheses"],
-        Rule::count => &["a count such as `3x`"],
-        Rule::unit => &["a unit"],
-        Rule::plus_minus | Rule::deviations | Rule::limits | Rule::fit | Rule::basic => &["a tolerance"],
-        Rule::plus | Rule::times => &["an operator"],
-        Rule::state_name | Rule::state => &["`mmc`", "`nominal`", "`lmc`"],
-        Rule::index => &["`[`"],
-        Rule::field_body | Rule::part_body | Rule::assembly_body | Rule::station_body | Rule::inspect_body => &["`{`"],
-        _ => &[],
-    }
-}
 
 /// Makes tree nodes from the pairs of one item, with spans in the whole file.
-struct Builder {
-    file: u32,
-    offset: usize,
+pub struct Builder {
+    pub file: u32,
+    pub offset: usize,
 }
 
 type Node<'i> = Pair<'i, Rule>;
@@ -177,7 +21,7 @@ impl Builder {
     }
 
     /// The statements inside a pair, and what stands behind the last.
-    fn lines(&self, pair: Node) -> (Vec<Line>, Vec<Gap>) {
+    pub fn lines(&self, pair: Node) -> (Vec<Line>, Vec<Gap>) {
         let (mut lines, mut gaps): (Vec<Line>, Vec<Gap>) = (Vec::new(), Vec::new());
         for inner in pair.into_inner() {
             match inner.as_rule() {
@@ -237,6 +81,9 @@ impl Builder {
             Rule::vary => Stmt::Vary(self.body(inner.last())),
             Rule::train => Stmt::Train(self.body(inner.last())),
             Rule::light => Stmt::Light { name: self.name(&inner.take(Rule::name)), call: self.call(inner.last()) },
+            Rule::outline => Stmt::Outline { name: self.name(&inner.take(Rule::name)), body: self.body(inner.last()) },
+            Rule::start => Stmt::Start { at: self.point(inner.take(Rule::point)), corner: self.corner(&inner) },
+            Rule::line | Rule::arc => Stmt::Side(Box::new(self.side(inner))),
             Rule::feature => Stmt::Feature(Box::new(self.feature(inner))),
             Rule::root => {
                 let names: Vec<Name> = inner.all(Rule::name).iter().map(|p| self.name(p)).collect();
@@ -259,11 +106,37 @@ impl Builder {
             op: self.name(&inner.take(Rule::op)),
             name: self.name(&inner.take(Rule::name)),
             count: inner.find(Rule::count).map(|p| self.count(&p)),
-            shape: self.call(inner.take(Rule::call)),
+            shape: self.shape(&inner),
             at: point(Rule::at),
             turn: point(Rule::turn),
             on: inner.find(Rule::on).map(|p| self.call(Children::of(p).take(Rule::call))),
         }
+    }
+
+    fn shape(&self, inner: &Children) -> Shape {
+        match inner.find(Rule::kw_group) {
+            Some(word) => Shape::Group { word: self.name(&word), body: self.body(inner.take(Rule::part_body)) },
+            None => Shape::Call(self.call(inner.take(Rule::call))),
+        }
+    }
+
+    fn side(&self, inner: Children) -> Side {
+        let name = inner.find(Rule::side_name).map(|p| self.name(&Children::of(p).take(Rule::name)));
+        let arc = inner.find(Rule::hand).map(|hand| Arc {
+            radius: self.dim(inner.take(Rule::dim)),
+            hand: self.name(&hand),
+            long: inner.find(Rule::long).is_some(),
+        });
+        Side { name, to: self.point(inner.take(Rule::point)), arc, corner: self.corner(&inner) }
+    }
+
+    fn corner(&self, inner: &Children) -> Option<Corner> {
+        let pair = inner.find(Rule::corner)?;
+        let span = self.span(&pair);
+        let kind = Children::of(pair).last();
+        let size = self.dim(Children::of(kind.clone()).take(Rule::dim));
+        let kind = if kind.as_rule() == Rule::round { CornerKind::Round } else { CornerKind::Chamfer };
+        Some(Corner { kind, size, span })
     }
 
     fn place(&self, inner: Children) -> Place {

@@ -1,0 +1,318 @@
+//! `outline`: a profile from corner to corner, for `prism` and `revolve`.
+//!
+//! In: an outline as written. Out: an [`Outline`] whose sides make one closed boundary at nominal and at the limits of
+//! every dimension of its own, or diagnostics that point at the side. Resolved once: whatever is made from it shares its
+//! dimensions.
+
+use super::dimension::General;
+use super::feature::Names;
+use super::fields::point_dims;
+use super::model::{Corner, DimId, Expr, Outline, OutlinePath, OutlineSide};
+use super::profile::{self, Fault};
+use super::scope::Resolver;
+use crate::diag::suggest::nearest;
+use crate::diag::{Diagnostic, Span};
+use crate::syntax::ast::{self, CornerKind, Stmt};
+use crate::units::Quantity;
+use std::collections::BTreeSet;
+
+/// More sides than this are a slip of the pen, and would not be checked in time.
+const MAX_SIDES: usize = 200;
+
+/// Names that the faces of prisms and the dimensions of outlines already have.
+const TAKEN: [&str; 3] = ["top", "bottom", "start"];
+
+/// An outline of the part at hand.
+#[derive(Debug, Clone)]
+pub struct Drawn {
+    /// `None` when it has faults, which are reported.
+    outline: Option<Outline>,
+    span: Span,
+    used: bool,
+}
+
+/// An outline with the places of its lines, for messages.
+struct Placed {
+    outline: Outline,
+    name: ast::Name,
+    sides: Vec<Span>,
+}
+
+impl Resolver {
+    /// Resolves the outlines of a part, whose dimensions are named under `path`.
+    pub fn draw_outlines(&mut self, body: &ast::Body, path: &str) {
+        for line in &body.lines {
+            let Stmt::Outline { name, body } = &line.stmt else { continue };
+            if let Some(first) = self.outlines.get(&name.text) {
+                let first = first.span;
+                self.duplicate("outline", name, first);
+                continue;
+            }
+            let outline = self.outline(name, body, &Names::plain(path).child(&name.text));
+            self.outlines.insert(name.text.clone(), Drawn { outline, span: name.span, used: false });
+        }
+    }
+
+    /// The outline of that name; `None` if there is none, or one with faults.
+    pub fn outline_named(&mut self, name: &str, span: Span) -> Option<Outline> {
+        if let Some(drawn) = self.outlines.get_mut(name) {
+            drawn.used = true;
+            return drawn.outline.clone();
+        }
+        let diagnostic =
+            Diagnostic::error("E0201", span, format!("no outline is named `{name}`")).label("unknown outline");
+        self.report(match nearest(name, self.outlines.keys().map(String::as_str)) {
+            Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+            None => diagnostic.help(format!("draw it in the part: `outline {name} {{ from (0, 0) … }}`")),
+        });
+        None
+    }
+
+    pub fn warn_unused_outlines(&mut self) {
+        let unused = self.outlines.iter().filter(|(_, drawn)| !drawn.used);
+        let unused: Vec<(String, Span)> = unused.map(|(name, drawn)| (name.clone(), drawn.span)).collect();
+        for (name, span) in unused {
+            self.unused("outline", &name, span);
+        }
+    }
+
+    /// Whether every corner of an outline to be turned lies on the right side of the axis; reports if not.
+    pub fn right_of_axis(&mut self, outline: &Outline, span: Span) -> bool {
+        let corners = std::iter::once(&outline.start).chain(outline.sides.iter().map(|s| &s.to));
+        let least = corners.map(|p| self.lowest(&p[0])).fold(f64::INFINITY, f64::min);
+        if least >= 0.0 {
+            return true;
+        }
+        let message =
+            format!("the outline reaches {} mm beyond the axis it is turned about", super::dimension::trim(-least));
+        self.report(
+            Diagnostic::error("E0213", span, message)
+                .label("x is the distance from the axis")
+                .help("keep every x at 0 or above, within its limits too"),
+        );
+        false
+    }
+
+    fn outline(&mut self, name: &ast::Name, body: &ast::Body, names: &Names) -> Option<Outline> {
+        let placed = self.read_outline(name, body, names)?;
+        let faults = self.outline_fault(&placed.outline);
+        match faults {
+            None => Some(placed.outline),
+            Some((fault, limit)) => {
+                self.report_outline(&placed, fault, limit);
+                None
+            }
+        }
+    }
+
+    fn read_outline(&mut self, name: &ast::Name, body: &ast::Body, names: &Names) -> Option<Placed> {
+        let start = self.start(name, body, &names.child("start"));
+        let mut seen: BTreeSet<&str> = BTreeSet::new();
+        let (mut sides, mut spans) = (Vec::new(), Vec::new());
+        for line in &body.lines {
+            let Stmt::Side(side) = &line.stmt else { continue };
+            if let Some(own) = &side.name
+                && (!seen.insert(&own.text) || TAKEN.contains(&own.text.as_str()))
+            {
+                self.side_name_taken(own);
+            }
+            spans.push(line.span);
+            sides.push(self.side(side, spans.len(), names));
+        }
+        if sides.len() > MAX_SIDES {
+            let message = format!("outline `{}` has {} sides, the limit is {MAX_SIDES}", name.text, sides.len());
+            self.report(Diagnostic::error("E0212", name.span, message).label("too many sides"));
+            return None;
+        }
+        let (start, start_corner) = start?;
+        let sides: Option<Vec<OutlineSide>> = sides.into_iter().collect();
+        let outline = Outline { start, start_corner, sides: sides? };
+        Some(Placed { outline, name: name.clone(), sides: spans })
+    }
+
+    /// Where the outline begins: its first line, and its only `from`.
+    fn start(&mut self, name: &ast::Name, body: &ast::Body, names: &Names) -> Option<([Expr; 2], Corner)> {
+        let starts = body.lines.iter().enumerate().filter_map(|(i, line)| match &line.stmt {
+            Stmt::Start { at, corner } => Some((i, line.span, at, corner.as_ref())),
+            _ => None,
+        });
+        let starts: Vec<_> = starts.collect();
+        let Some((index, span, at, corner)) = starts.first() else {
+            let message = format!("outline `{}` begins nowhere", name.text);
+            let help = "begin with `from (0, 0)`";
+            self.report(Diagnostic::error("E0207", name.span, message).label("`from` is missing").help(help));
+            return None;
+        };
+        if let Some((_, again, ..)) = starts.get(1) {
+            let message = "an outline begins once";
+            self.report(Diagnostic::error("E0202", *again, message).label("again").also(*span, "begins here"));
+        } else if *index > 0 {
+            let message = "`from` is the first line of an outline";
+            self.report(Diagnostic::error("E0101", *span, message).label("not the first").help("move it up"));
+        }
+        Some((self.corner_point(at, names)?, self.corner(*corner, names)?))
+    }
+
+    fn side_name_taken(&mut self, name: &ast::Name) {
+        let message = match TAKEN.contains(&name.text.as_str()) {
+            true => format!("`{}` is no name for a side: ends and beginnings are called that", name.text),
+            false => format!("two sides of one outline are named `{}`", name.text),
+        };
+        self.report(Diagnostic::error("E0202", name.span, message).label("taken").help("choose another name"));
+    }
+
+    fn side(&mut self, side: &ast::Side, number: usize, names: &Names) -> Option<OutlineSide> {
+        let name = side.name.as_ref().map_or_else(|| number.to_string(), |n| n.text.clone());
+        let names = names.child(&name);
+        let to = self.corner_point(&side.to, &names);
+        let path = match &side.arc {
+            None => Some(OutlinePath::Line),
+            Some(arc) => {
+                let (left, long) = (arc.hand.text == "left", arc.long);
+                let radius = self.own_size(&arc.radius, General::Basic, &names.of("radius", false));
+                radius.map(|radius| OutlinePath::Arc { radius, left, long })
+            }
+        };
+        let corner = self.corner(side.corner.as_ref(), &names);
+        Some(OutlineSide { name, to: to?, path: path?, corner: corner? })
+    }
+
+    fn corner(&mut self, corner: Option<&ast::Corner>, names: &Names) -> Option<Corner> {
+        let Some(corner) = corner else { return Some(Corner::Sharp) };
+        let (word, make): (_, fn(Expr) -> Corner) = match corner.kind {
+            CornerKind::Round => ("round", Corner::Round),
+            CornerKind::Chamfer => ("chamfer", Corner::Chamfer),
+        };
+        self.own_size(&corner.size, General::Edge, &names.of(word, false)).map(make)
+    }
+
+    /// A size that is positive at every limit.
+    fn own_size(&mut self, dim: &ast::Dim, general: General, name: &str) -> Option<Expr> {
+        self.no_each(dim);
+        let expr = self.dimension(dim, Quantity::Length, general, name)?;
+        self.positive(&expr, name, dim.span, false).then_some(expr)
+    }
+
+    fn corner_point(&mut self, point: &ast::Point, names: &Names) -> Option<[Expr; 2]> {
+        let dims = point_dims(point);
+        let [x, y] = dims.as_slice() else {
+            self.wrong_form(point.span, "two coordinates `(x, y)`");
+            return None;
+        };
+        let [x, y] = [(x, "x"), (y, "y")].map(|(dim, axis)| {
+            self.no_each(dim);
+            self.dimension(dim, Quantity::Length, General::Basic, &names.of(axis, false))
+        });
+        Some([x?, y?])
+    }
+
+    fn no_each(&mut self, dim: &ast::Dim) {
+        if dim.each {
+            let message = "`each` belongs to a dimension of a feature, and an outline is one for all copies";
+            self.report(Diagnostic::error("E0211", dim.span, message).label("not here"));
+        }
+    }
+
+    /// The first fault at nominal or at a limit of one of the outline's dimensions, with that dimension.
+    fn outline_fault(&self, outline: &Outline) -> Option<(Fault, Option<DimId>)> {
+        let mut values = self.nominal.clone();
+        match profile::trace(outline, &values) {
+            Err(fault) => return Some((fault, None)),
+            Ok(stretches) => {
+                if let Some(fault) = profile::touching(&stretches) {
+                    return Some((fault, None));
+                }
+            }
+        }
+        let count = |values: &[f64]| profile::trace(outline, values).map(|s| s.len());
+        let sides = count(&values);
+        for id in outline_dims(outline) {
+            let i = id.0 as usize;
+            for limit in [self.dims[i].range.low, self.dims[i].range.high] {
+                let nominal = std::mem::replace(&mut values[i], limit);
+                let found = count(&values);
+                values[i] = nominal;
+                match found {
+                    Err(fault) => return Some((fault, Some(id))),
+                    // A side that closes the outline only at a limit has no length otherwise.
+                    found if found != sides => return Some((Fault::NoLength { side: outline.sides.len() }, Some(id))),
+                    _ => {}
+                }
+            }
+        }
+        None
+    }
+
+    fn report_outline(&mut self, placed: &Placed, fault: Fault, limit: Option<DimId>) {
+        let name = &placed.name;
+        let owner = format!("outline `{}`", name.text);
+        let spoken = |side: usize| match placed.outline.sides.get(side) {
+            Some(s) if s.name.parse::<usize>().is_err() => format!("side `{}`", s.name),
+            Some(_) => format!("side {}", side + 1),
+            None => "the straight side that closes it".to_string(),
+        };
+        let place = |side: usize| placed.sides.get(side).copied().unwrap_or(name.span);
+        let number = |v: f64| format!("{}", (v * 1e3).round() / 1e3);
+        let error = |span, message: String, label: &str| Diagnostic::error("E0213", span, message).label(label);
+        let mut diagnostic = match fault {
+            Fault::NoLength { side } => {
+                error(place(side), format!("{owner}: {} has no length", spoken(side)), "ends where it begins").help(
+                    match side < placed.sides.len() {
+                        true => "remove this side",
+                        false => "write the last corner with the dimensions of the first, or leave it out",
+                    },
+                )
+            }
+            Fault::ShortRadius { side, radius, half } => error(
+                place(side),
+                format!(
+                    "{owner}: the ends of {} are {} mm apart, too far for a radius of {}",
+                    spoken(side),
+                    number(2.0 * half),
+                    number(radius)
+                ),
+                "the arc does not reach",
+            )
+            .help(format!("write `radius {}` or more", number((half * 1e3).ceil() / 1e3))),
+            Fault::BesideArc { side } => error(
+                place(side),
+                format!("{owner}: only a corner between two lines can be broken"),
+                "its corner lies on an arc",
+            )
+            .help("remove the corner's size, and draw what stands there as a side of its own"),
+            Fault::TwoCorners => error(
+                place(placed.sides.len() - 1),
+                format!("{owner}: the last corner is the first one"),
+                "ends where the outline begins",
+            )
+            .help("give the corner's size once, behind `from`"),
+            Fault::NoRoom { side } => error(
+                place(side),
+                format!("{owner}: breaking this corner leaves nothing of a side"),
+                "too large for the sides beside it",
+            )
+            .help("make the corner's size smaller; a full round is an `arc`"),
+            Fault::Touch { sides: [a, b], at } => error(
+                place(b),
+                format!("{owner}: {} meets {} at ({}, {})", spoken(b), spoken(a), number(at[0]), number(at[1])),
+                "meets another side",
+            )
+            .also(place(a), "this one")
+            .help("an outline goes round once, without touching itself"),
+            Fault::Flat => error(name.span, format!("{owner} encloses nothing"), "no area")
+                .help("draw at least three sides, or two with an arc"),
+        };
+        if let Some(id) = limit {
+            let dim = &self.dims[id.0 as usize];
+            diagnostic = diagnostic.also(dim.span, format!("so at a limit of `{}`", dim.name));
+        }
+        self.report(diagnostic);
+    }
+}
+
+/// The dimensions of an outline, each once.
+fn outline_dims(outline: &Outline) -> BTreeSet<DimId> {
+    let mut dims = Vec::new();
+    outline.exprs().into_iter().for_each(|e| e.dims(&mut dims));
+    dims.into_iter().collect()
+}
