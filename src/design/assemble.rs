@@ -8,6 +8,7 @@ use super::fields::Fields;
 use super::model::{Component, Expr, Part, PoseExpr};
 use super::part::PartSource;
 use super::scope::{Remark, Resolver};
+use super::seat::{Seat, copies};
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{self, Stmt, Value};
@@ -42,12 +43,6 @@ pub struct Assembled {
     pub groups: BTreeMap<String, Vec<usize>>,
     /// Names of the parts that were placed.
     pub placed: BTreeSet<String>,
-}
-
-/// What one placement stands on: a component and the frame of one of its features.
-struct Seat {
-    component: usize,
-    frame: PoseExpr,
 }
 
 impl Resolver {
@@ -190,69 +185,15 @@ impl Resolver {
         });
     }
 
-    /// Where copies placed on `path` stand, in order.
-    fn seats(&mut self, path: &ast::Path, built: &Assembled) -> Option<Vec<Seat>> {
-        let (first, rest) = path.segments.split_first()?;
-        let group = built.groups.get(&first.name.text)?;
-        let chosen = self.chosen(first, group.len())?;
-        let components: Vec<usize> = chosen.into_iter().map(|i| group[i]).collect();
-        let Some((feature, deeper)) = rest.split_first() else {
-            return Some(
-                components.into_iter().map(|component| Seat { component, frame: PoseExpr::identity() }).collect(),
-            );
-        };
-        if let Some(too_deep) = deeper.first() {
-            let message = format!("`{}` has no parts of its own", feature.name.text);
-            self.report(
-                Diagnostic::error("E0203", too_deep.name.span, message).label("a feature is the last of its path"),
-            );
-            return None;
-        }
-        let mut seats = Vec::new();
-        for component in components {
-            seats.extend(self.feature_seats(component, feature, built)?);
-        }
-        Some(seats)
-    }
-
-    fn feature_seats(&mut self, component: usize, wanted: &ast::Segment, built: &Assembled) -> Option<Vec<Seat>> {
-        let part = &built.parts[built.components[component].part];
-        let Some(feature) = part.features.iter().find(|f| f.name == wanted.name.text) else {
-            let message = format!("part `{}` has no feature `{}`", part.name, wanted.name.text);
-            let diagnostic = Diagnostic::error("E0201", wanted.name.span, message).label("unknown feature");
-            let names = part.features.iter().map(|f| f.name.as_str());
-            self.report(match nearest(&wanted.name.text, names.clone()) {
-                Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
-                None => diagnostic.help(format!("its features: {}", names.collect::<Vec<_>>().join(", "))),
-            });
-            return None;
-        };
-        let chosen = self.chosen(wanted, feature.copies.len())?;
-        Some(chosen.into_iter().map(|i| Seat { component, frame: feature.copies[i].pose.clone() }).collect())
-    }
-
-    /// Indices that `[2]` or `[1..3]` picks among `count`; all without an index.
-    pub fn chosen(&mut self, segment: &ast::Segment, count: usize) -> Option<Vec<usize>> {
-        let Some(index) = &segment.index else { return Some((0..count).collect()) };
-        let last = index.last.unwrap_or(index.first);
-        if index.first >= 1 && index.first <= last && last <= count as u64 {
-            return Some((index.first as usize - 1..last as usize).collect());
-        }
-        let message = format!("`{}` has {}", segment.name.text, copies(count));
-        self.report(
-            Diagnostic::error("E0505", index.span, message)
-                .label("no such copy")
-                .help(format!("write `{}[1]`", segment.name.text)),
-        );
-        None
-    }
-
     fn counts_differ(&mut self, place: &ast::Place, count: u64, seats: usize) {
         let part = &place.part.as_ref().unwrap_or(&place.name).text;
         let target = place.on.segments.iter().map(|s| s.name.text.as_str()).collect::<Vec<_>>().join(".");
         let message = format!("{count}x `{part}` on `{target}`, which has {}", copies(seats));
         let span = place.count.as_ref().map_or(place.name.span, |c| c.span);
-        let help = if count < seats as u64 && place.on.segments.iter().all(|s| s.index.is_none()) {
+        let help = if count < seats as u64
+            && place.on.segments.len() <= 2
+            && place.on.segments.iter().all(|s| s.index.is_none())
+        {
             let chosen = if count == 1 { "1".to_string() } else { format!("1..{count}") };
             format!("write `{seats}x {part}`, or place on `{target}[{chosen}]`")
         } else {
@@ -387,8 +328,4 @@ fn pieces(body: &ast::Body) -> BTreeMap<&str, u64> {
         *total = total.saturating_add(count);
     }
     counts
-}
-
-fn copies(count: usize) -> String {
-    if count == 1 { "1 copy".to_string() } else { format!("{count} copies") }
 }

@@ -4,6 +4,7 @@
 //! dimensions, or arithmetic over rows) or a [`Range`]. A bare number has the unit of its file; a bare deviation that of
 //! the size it belongs to; a deviation in % is a share of the nominal value.
 
+use super::interval::bounds;
 use super::model::Expr;
 use super::scope::{Named, Remark, Resolver, Typed, Use};
 use super::sum::scaled;
@@ -15,6 +16,8 @@ use crate::units::{Quantity, Range};
 
 /// Larger numbers (mm, rad, px) are slips of the pen or overflow.
 const LARGEST: f64 = 1e9;
+/// Longer lengths (mm) are, too: a kilometre, where a solid could no longer be told to a thousandth of a micrometre.
+const LONGEST: f64 = 1e6;
 
 /// Deviations above this share of the size are probably in the wrong unit.
 const DOUBTFUL_SHARE: f64 = 0.1;
@@ -61,7 +64,7 @@ impl Resolver {
     pub fn dimension(&mut self, dim: &ast::Dim, want: Quantity, general: General, name: &str) -> Option<Expr> {
         let typed = self.value(dim, Use::Shared, general, name, Some(want))?;
         let expr = self.coerce(typed, want, dim.span)?;
-        self.finite(expr, dim.span)
+        self.finite(expr, want, dim.span)
     }
 
     /// The range of a value that is not sampled with the parts: a material, a camera, a lamp.
@@ -71,7 +74,7 @@ impl Resolver {
         let scaled = |v: f64| v * scale;
         let Range { low, nominal, high } = limited.range;
         let range = Range { low: scaled(low), nominal: scaled(nominal), high: scaled(high) };
-        self.in_bounds(range, dim.span)
+        self.in_bounds(range, want, dim.span)
     }
 
     /// A named dimension. Without a unit it is a length.
@@ -83,7 +86,7 @@ impl Resolver {
         let typed = self.value(&named.dim, usage, General::Applies, &named.path, None)?;
         let quantity = typed.quantity.unwrap_or(Quantity::Length);
         let expr = self.coerce(typed, quantity, named.dim.span)?;
-        Some(Typed { expr: self.finite(expr, named.dim.span)?, quantity: Some(quantity) })
+        Some(Typed { expr: self.finite(expr, quantity, named.dim.span)?, quantity: Some(quantity) })
     }
 
     fn value(
@@ -108,7 +111,7 @@ impl Resolver {
         let quantity = limited.quantity.or(want).unwrap_or(Quantity::Length);
         let scale = self.bare_scale(limited.quantity, quantity, dim.span)?;
         let range = Range { low: low * scale, nominal: nominal * scale, high: high * scale };
-        let range = self.in_bounds(range, dim.span)?;
+        let range = self.in_bounds(range, quantity, dim.span)?;
         let states = limited.remark.states.map(|s| s.map(|v| v * scale));
         let remark = Remark { states, each: dim.each, ..limited.remark };
         Some(Typed {
@@ -432,23 +435,27 @@ impl Resolver {
         );
     }
 
-    /// Refuses arithmetic that has no value at nominal.
-    fn finite(&mut self, expr: Expr, span: Span) -> Option<Expr> {
-        let value = expr.eval(&self.nominal);
-        self.in_bounds(Range::exactly(value), span).map(|_| expr)
+    /// Refuses arithmetic that has no value at nominal or somewhere within the limits.
+    fn finite(&mut self, expr: Expr, quantity: Quantity, span: Span) -> Option<Expr> {
+        let range = bounds(&expr, &|id| self.dims[id.0 as usize].range);
+        let nominal = expr.eval(&self.nominal);
+        self.in_bounds(Range { nominal, ..range }, quantity, span).map(|_| expr)
     }
 
-    fn in_bounds(&mut self, range: Range, span: Span) -> Option<Range> {
-        let good = [range.low, range.nominal, range.high].iter().all(|v| v.is_finite() && v.abs() <= LARGEST);
+    fn in_bounds(&mut self, range: Range, quantity: Quantity, span: Span) -> Option<Range> {
+        let (largest, unit) = if quantity == Quantity::Length { (LONGEST, " mm") } else { (LARGEST, "") };
+        let good = [range.low, range.nominal, range.high].iter().all(|v| v.is_finite() && v.abs() <= largest);
         if good {
             return Some(range);
         }
-        let message = if range.nominal.is_finite() {
-            format!("{:e} is beyond every drawing", range.high.abs().max(range.low.abs()))
-        } else {
-            "this arithmetic has no value".to_string()
+        let message = match range {
+            Range { nominal, .. } if !nominal.is_finite() => "this arithmetic has no value".to_string(),
+            Range { low, high, .. } if !(low.is_finite() && high.is_finite()) => {
+                "this arithmetic has no value at some limit of its dimensions".to_string()
+            }
+            Range { low, high, .. } => format!("{:e}{unit} is beyond every drawing", high.abs().max(low.abs())),
         };
-        let help = format!("numbers may reach ±{LARGEST:e}, and nothing may be divided by zero");
+        let help = format!("it may reach ±{largest:e}{unit}, and nothing may be divided by zero");
         self.report(Diagnostic::error("E0210", span, message).label("no usable number").help(help));
         None
     }

@@ -18,6 +18,7 @@ mod part;
 mod pattern;
 mod profile;
 mod scope;
+mod seat;
 mod sense;
 mod shape;
 mod station;

@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 
 /// More features than this in one part, copies counted, are a slip of the pen.
 const MAX_FEATURES: u64 = 4000;
-/// More features than this in all parts of the assembly, every piece counted, would not be judged in time.
-const MAX_FEATURES_IN_ALL: u64 = 200_000;
+/// More lines or features than this in all parts of the assembly, every piece counted, would not be judged in time.
+const MAX_LINES_IN_ALL: u64 = 200_000;
 
 /// A part as written.
 #[derive(Debug, Clone, Copy)]
@@ -45,9 +45,10 @@ impl Resolver {
             self.report(Diagnostic::error("E0212", source.name.span, message).label("too many features"));
             return false;
         }
-        self.features_in_all += total;
-        if self.features_in_all > MAX_FEATURES_IN_ALL {
-            let message = format!("the parts of the assembly have more than {MAX_FEATURES_IN_ALL} features in all");
+        self.lines_in_all += total.max(lines(source.body));
+        if self.lines_in_all > MAX_LINES_IN_ALL {
+            let message =
+                format!("the pieces of the assembly have more than {MAX_LINES_IN_ALL} lines or features in all");
             self.report(Diagnostic::error("E0212", source.name.span, message).label("too many pieces of this part"));
             return false;
         }
@@ -187,4 +188,17 @@ fn leaves(body: &ast::Body) -> u64 {
     };
     let features = body.lines.iter().filter_map(as_feature);
     features.fold(0, |sum, f| sum.saturating_add(copies(f).saturating_mul(one(f))))
+}
+
+/// Statements of a body and of the blocks in it.
+fn lines(body: &ast::Body) -> u64 {
+    let inner = |line: &ast::Line| match &line.stmt {
+        Stmt::Outline { body, .. } => lines(body),
+        Stmt::Feature(feature) => match &feature.shape {
+            ast::Shape::Group { body, .. } => lines(body),
+            ast::Shape::Call(_) => 0,
+        },
+        _ => 0,
+    };
+    body.lines.iter().map(|line| 1 + inner(line)).sum()
 }

@@ -95,8 +95,8 @@ pub struct Resolver {
     pub nominal: Vec<f64>,
     /// The outlines of the part at hand.
     pub outlines: BTreeMap<String, Drawn>,
-    /// Features of all parts so far, copies counted.
-    pub features_in_all: u64,
+    /// Lines or features of all pieces so far, whichever are more.
+    pub lines_in_all: u64,
     pub diagnostics: Vec<Diagnostic>,
     /// Names being evaluated, outermost first.
     chain: Vec<(String, Span)>,

@@ -14,6 +14,9 @@ use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{self, Value};
 use crate::units::Quantity;
 
+/// Smaller sizes (mm) are none: a tenth of a micrometre is less than any surface is rough.
+const SMALLEST: f64 = 1e-4;
+
 /// The words a feature may be made with, for messages.
 const WORDS: [&str; 11] =
     ["box", "cylinder", "cone", "frustum", "sphere", "torus", "prism", "revolve", "hole", "counterbore", "countersink"];
@@ -219,10 +222,11 @@ impl Resolver {
     /// Whether a size is positive at every limit; reports if not.
     pub fn positive(&mut self, expr: &Expr, owner: &str, span: Span, may_be_zero: bool) -> bool {
         let low = self.lowest(expr);
-        if low > 0.0 || (may_be_zero && low == 0.0) {
+        if low >= SMALLEST || (may_be_zero && low == 0.0) {
             return true;
         }
-        let message = format!("`{owner}` may reach {} mm", trim(low));
+        let shown = if low.abs() < SMALLEST && low != 0.0 { format!("{low:e}") } else { trim(low).to_string() };
+        let message = format!("`{owner}` may reach {shown} mm");
         self.report(
             Diagnostic::error("E0307", span, message)
                 .label("a size must be positive at every limit")

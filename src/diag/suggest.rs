@@ -1,10 +1,21 @@
 //! Did you mean …: the known name nearest to an unknown one.
 
+/// Longer words are no slips of the pen (letters).
+const LONGEST: usize = 64;
+/// More candidates are not looked at: a suggestion is not worth the time.
+const MOST: usize = 1000;
+
 /// The candidate that differs least from `word`, if it is near enough to be a slip of the pen: at most a third of its
 /// letters (and at least one) may differ. The first of equals wins.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let allowed = (word.chars().count() / 3).max(1);
-    let scored = candidates.into_iter().map(|c| (distance(word, c), c)).filter(|&(d, c)| d <= allowed && c != word);
+    let length = word.chars().count();
+    if length > LONGEST {
+        return None;
+    }
+    let allowed = (length / 3).max(1);
+    let likely =
+        candidates.into_iter().take(MOST).filter(|c| c.chars().take(LONGEST + 1).count().abs_diff(length) <= allowed);
+    let scored = likely.map(|c| (distance(word, c), c)).filter(|&(d, c)| d <= allowed && c != word);
     scored.min_by_key(|&(d, _)| d).map(|(_, c)| c)
 }
 

@@ -10,6 +10,8 @@
 
 mod body;
 mod motion;
+#[cfg(test)]
+mod tests;
 
 use super::model::{DimId, Expr, Part, Sense, Shape};
 use super::scope::Resolver;
@@ -90,7 +92,7 @@ impl Resolver {
         if open.is_empty() {
             return;
         }
-        let nominal = Nominal::of(body, values);
+        let nominal = Nominal::of(body, values, open.len());
         for id in open {
             let Motion { gained, lost } = nominal.motion(id, self.dims[id.0 as usize].range.half_width(), values);
             let seen = &mut uses[id.0 as usize].motion;

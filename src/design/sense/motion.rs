@@ -18,8 +18,10 @@ const STEP: f64 = 0.1;
 const STILL: f64 = 1e-4;
 /// Points per face, unless there are too many faces.
 const SAMPLES: usize = 24;
-/// Membership questions to primitives per dimension, which bounds the time a large pattern takes.
-const BUDGET: usize = 2_000_000;
+/// Membership questions to primitives per part, which bounds the time that large patterns take.
+const BUDGET: usize = 20_000_000;
+/// And per dimension, so that one does not take what the others need.
+const BUDGET_EACH: usize = 2_000_000;
 
 /// A face that moves, for messages.
 #[derive(Debug, Clone)]
@@ -43,21 +45,25 @@ pub struct Nominal<'a> {
     /// Dimensions of each leaf.
     dims: Vec<BTreeSet<DimId>>,
     radius: f64,
+    /// Membership questions per dimension.
+    budget: usize,
 }
 
 impl<'a> Nominal<'a> {
-    pub fn of(body: Body<'a>, values: &[f64]) -> Self {
+    /// Ready for questions about `count` dimensions.
+    pub fn of(body: Body<'a>, values: &[f64], count: usize) -> Self {
         let placed = body.at(values);
         let radius = placed.iter().flatten().map(Placed::extent).fold(1.0, f64::max);
         let dims = body.leaves.iter().map(leaf_dims).collect();
-        Nominal { body, placed, dims, radius }
+        let budget = (BUDGET / count.max(1)).min(BUDGET_EACH);
+        Nominal { body, placed, dims, radius, budget }
     }
 
     /// Moves the dimension `id` by a share of `half_width` to both sides of its nominal value, which `values` holds.
     pub fn motion(&self, id: DimId, half_width: f64, values: &mut [f64]) -> Motion {
         let moving: Vec<usize> = (0..self.dims.len()).filter(|i| self.dims[*i].contains(&id)).collect();
         let faces: usize = moving.iter().filter_map(|i| self.placed[*i].as_ref()).map(Placed::faces).sum();
-        let questions = BUDGET / (2 * self.body.leaves.len()).max(1);
+        let questions = self.budget / (2 * self.body.leaves.len()).max(1);
         let count = (questions / faces.max(1)).clamp(1, SAMPLES);
         let stride = (faces * count / questions.max(1)).max(1);
         let step = half_width * STEP;
