@@ -2,7 +2,7 @@
 
 #![cfg(feature = "compile")]
 
-use gonogo::design::model::{Design, Expr, LightShape, Sense};
+use gonogo::design::model::{Corner, Design, Expr, LightShape, Sense, Shape};
 use gonogo::design::{Loaded, load};
 
 fn read(path: &str) -> std::io::Result<String> {
@@ -25,7 +25,7 @@ fn dim<'a>(design: &'a Design, name: &str) -> &'a gonogo::design::model::Dimensi
 
 #[test]
 fn every_spec_is_in_canonical_layout() {
-    for name in ["pattern_wheel", "four_screws", "pinned_plate"] {
+    for name in ["pattern_wheel", "four_screws", "pinned_plate", "shapes"] {
         let text = read(&format!("specs/{name}.gng")).unwrap();
         assert_eq!(gonogo::syntax::format(&text).unwrap(), text, "{name}");
     }
@@ -153,4 +153,52 @@ fn a_setting_overrides_a_let_and_the_digest_knows_it() {
     assert!((dim(larger.design.as_ref().unwrap(), "plate.bore[1].d").mmc - 8.0).abs() < 1e-12);
     assert_ne!(larger.text, loaded(path).text);
     assert_eq!(larger.inputs, [path]);
+}
+
+#[test]
+fn shapes_of_every_kind_make_a_design() {
+    let design = design("shapes");
+    let bracket = &design.parts[0];
+    let Shape::Prism { outline, .. } = &bracket.features[0].copies[0].shape else { panic!("the rail is a prism") };
+    let sides: Vec<&str> = outline.sides.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(sides, ["base", "2", "3", "crown", "5"]);
+    assert_eq!(outline.sides[1].corner, Corner::Round(outline.sides[1].corner.size().unwrap().clone()));
+    let mount = bracket.features.iter().find(|f| f.name == "mount").unwrap();
+    let Shape::Group { features } = &mount.copies[0].shape else { panic!("the mount is a group") };
+    let names: Vec<(&str, usize)> = features.iter().map(|f| (f.name.as_str(), f.copies.len())).collect();
+    assert_eq!(names, [("screw", 4), ("dowel", 2)]);
+    let Shape::Group { features } = &features[0].copies[3].shape else { panic!("a counterbore is a group") };
+    let names: Vec<&str> = features.iter().map(|f| f.name.as_str()).collect();
+    assert_eq!(names, ["bore", "head"]);
+    let sense = |name: &str| dim(&design, name).sense;
+    assert_eq!(sense("bracket.mount.screw.head_h"), Sense::Internal);
+    assert_eq!(sense("bracket.profile.2.round"), Sense::Internal);
+    assert_eq!(sense("bushing.body.d"), Sense::External);
+    assert_eq!(design.measures.len(), 1);
+    assert_eq!(design.measures[0].from.face, "rail.top");
+}
+
+/// Code blocks of the manual, marked with what they are lines of: a `part`, the `assembly`, or a whole spec.
+#[test]
+fn examples_of_the_manual_compile() {
+    let manual = read("docs/language.md").unwrap();
+    let blocks: Vec<&str> = manual.split("```gng").skip(1).map(|b| b.split("```").next().unwrap()).collect();
+    assert!(blocks.len() >= 5);
+    for block in blocks {
+        let (kind, lines) = block.split_once('\n').unwrap();
+        let part = |lines: &str| format!("part plate {{\n    material = steel\n{lines}}}\n");
+        let plate = "    add slab = box(x = 80, y = 50, z = 10)\n    cut bore = 3x cylinder(d = 6, h = through) on circle(d = 36)\n";
+        let pin = "part pin {\n    material = steel\n    add shank = cylinder(d = 6, h = 18)\n}\n";
+        let (plate, pin, placed) = match kind.trim() {
+            "part" => (part(lines), "", String::new()),
+            "assembly" => (part(plate), pin, format!("    place pin = 3x pin on plate.bore\n{lines}")),
+            other => panic!("a block of `{other}`"),
+        };
+        let text = format!(
+            "gonogo 1\ntolerances ISO2768-m\nmaterial steel {{\n    metal = steel\n}}\n{plate}{pin}\
+             assembly plate {{\n    root plate\n{placed}}}\nstation bench {{\n    light room = room(patches = 9)\n}}\n"
+        );
+        let loaded = load("manual.gng", &|_| Ok(text.clone()), &[]);
+        assert!(loaded.diagnostics.is_empty(), "{:#?}\n{text}", loaded.diagnostics);
+    }
 }

@@ -6,10 +6,11 @@ use gonogo::syntax::ast::{Body, File, Gap, Line, Shape, Stmt};
 use gonogo::syntax::{format, parse};
 use proptest::prelude::*;
 
-const SPECS: [&str; 3] = [
+const SPECS: [&str; 4] = [
     include_str!("../specs/pattern_wheel.gng"),
     include_str!("../specs/four_screws.gng"),
     include_str!("../specs/pinned_plate.gng"),
+    include_str!("../specs/shapes.gng"),
 ];
 
 /// The tree without blank lines, which are layout.
@@ -78,6 +79,24 @@ fn formatting_keeps_comments_everywhere() {
 }
 
 #[test]
+fn formatting_keeps_comments_of_groups_and_outlines() {
+    let text = "part p{\n//above\noutline  o{//open\nfrom(0,0)round 1//start\n//between\nline a to(10±0.1,0)mm chamfer 2\narc to(0,5)radius 8 left long//arc\n//last\n}\ncut g=2x group at(0,0,1)on line(pitch=3){//group\nadd a=hole(d=1,h=2)//hole\n//end\n}//behind\n}\nassembly a{\nroot p\nmeasure m=from p.o.1 to p.g[2].a.+x within 1..2//measure\n}";
+    assert_formats(text);
+    let laid_out = format(text).unwrap();
+    for comment in ["above", "open", "start", "between", "arc", "last", "group", "hole", "end", "behind", "measure"] {
+        assert_eq!(laid_out.matches(&format!("//{comment}")).count(), 1, "{comment}\n{laid_out}");
+    }
+    for line in [
+        "    outline o {  //open\n        from (0, 0) round 1  //start\n",
+        "        line a to (10 ±0.1, 0) mm chamfer 2\n        arc to (0, 5) radius 8 left long  //arc\n",
+        "    cut g = 2x group at (0, 0, 1) on line(pitch = 3) {  //group\n        add a = hole(d = 1, h = 2)  //hole\n",
+        "    measure m = from p.o.1 to p.g[2].a.+x within 1 .. 2  //measure\n",
+    ] {
+        assert!(laid_out.contains(line), "{line}\n{laid_out}");
+    }
+}
+
+#[test]
 fn formatting_wraps_what_is_too_long() {
     let text = format!(
         "station s {{\n    light l = panel(width = 100, height = 100, at = ({0}, {0}, {0}), aim = ({0}, {0}, {0}))\n}}\n",
@@ -103,6 +122,13 @@ fn deep_nesting_is_refused_and_not_overflowed() {
         assert_eq!(parse(&text, 0).1.is_empty(), depth <= 32, "{depth}");
     }
     parse(&"{".repeat(100_000), 0);
+    let groups = |depth: usize| {
+        format!("part p {{\n{}add a = sphere(d = 1)\n{}}}\n", "add a = group {\n".repeat(depth), "}\n".repeat(depth))
+    };
+    for depth in [20, 40, 20_000] {
+        assert_eq!(parse(&groups(depth), 0).1.is_empty(), depth <= 30, "{depth}");
+        load(&groups(depth));
+    }
     parse(&"part p {\n".repeat(10_000), 0);
 }
 
@@ -110,6 +136,15 @@ fn deep_nesting_is_refused_and_not_overflowed() {
 fn a_long_statement_list_is_read_in_time() {
     let text = format!("part p {{\n{}}}\n", "    cut a = cylinder(d = 6 H7, h = (a + b * (c - 1 mm)))\n".repeat(5_000));
     assert!(parse(&text, 0).1.is_empty());
+}
+
+#[test]
+fn a_long_sum_is_refused_and_not_overflowed() {
+    for terms in [200, 400, 100_000] {
+        let text = format!("gonogo 1\nlet a = ({}1)\n", "1 + ".repeat(terms));
+        assert_eq!(parse(&text, 0).1.is_empty(), terms < 300, "{terms}");
+        load(&text);
+    }
 }
 
 proptest! {
@@ -126,7 +161,7 @@ proptest! {
     }
 
     #[test]
-    fn mutated_specs_never_panic(spec in 0usize..3, at in 0.0f64..1.0, cut in 0usize..40, insert in word()) {
+    fn mutated_specs_never_panic(spec in 0usize..4, at in 0.0f64..1.0, cut in 0usize..40, insert in word()) {
         let text = SPECS[spec];
         let start = text.floor_char_boundary((at * text.len() as f64) as usize);
         let end = text.ceil_char_boundary((start + cut).min(text.len()));
@@ -147,6 +182,15 @@ fn load(text: &str) {
 fn word() -> impl Strategy<Value = String> {
     let words = [
         "part",
+        "group",
+        "outline",
+        "from (0, 0)",
+        "line to (10, 0) round 1",
+        "arc nose to (0, 5) radius 8 left long",
+        "prism(outline = a, h = 3)",
+        "counterbore(d = 3, h = through, head_d = 5, head_h = 2)",
+        "measure",
+        "within",
         "material",
         "assembly",
         "station",
