@@ -22,6 +22,7 @@ impl Sizes<'_, '_> {
     /// `hole(d, h)`, with a drill's point below its depth when `tip` is given.
     pub fn hole(&mut self) -> Option<Shape> {
         self.known(&["d", "h", "tip"]);
+        self.takes_material()?;
         let (d, h) = (self.size("d", "6"), self.extent("h"));
         let tip = self.has("tip").then(|| self.angle("tip"));
         let (d, h) = (d?, h?);
@@ -45,6 +46,7 @@ impl Sizes<'_, '_> {
     /// A bore with a wider cylinder at its mouth for a screw's head.
     pub fn counterbore(&mut self) -> Option<Shape> {
         self.known(&["d", "h", "head_d", "head_h"]);
+        self.takes_material()?;
         let (d, h) = (self.size("d", "6"), self.extent("h"));
         let (head_d, head_h) = (self.size("head_d", "11"), self.size("head_h", "6"));
         let (d, h, head_d, head_h) = (d?, h?, head_d?, head_h?);
@@ -61,6 +63,7 @@ impl Sizes<'_, '_> {
     /// A bore with a cone at its mouth, `head_d` wide in the face.
     pub fn countersink(&mut self) -> Option<Shape> {
         self.known(&["d", "h", "head_d", "angle"]);
+        self.takes_material()?;
         let (d, h, head_d) = (self.size("d", "6"), self.extent("h"), self.size("head_d", "12"));
         let angle = self.angle("angle");
         let (d, h, head_d) = (d?, h?, head_d?);
@@ -147,6 +150,21 @@ impl Sizes<'_, '_> {
         sides.push(side("top", [Expr::Const(0.0), h]));
         let start = [Expr::Const(0.0), Expr::Const(0.0)];
         Shape::Revolve { outline: Outline { start, start_corner: Corner::Sharp, sides } }
+    }
+
+    /// Reports a hole that would add material.
+    fn takes_material(&mut self) -> Option<()> {
+        if self.context.void {
+            return Some(());
+        }
+        let word = &self.fields.owner;
+        let message = format!("a {word} takes material away, and here it would add some");
+        let help = match self.context.in_cut {
+            true => "in a group that is cut, holes are added",
+            false => "write `cut` in place of `add` or `keep`",
+        };
+        self.resolver.report(Diagnostic::error("E0211", self.fields.span, message).label("not cut").help(help));
+        None
     }
 
     fn bore(&self, d: Expr, h: Extent) -> Feature {

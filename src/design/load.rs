@@ -419,9 +419,13 @@ impl Resolver {
 
     /// Parts that are placed nowhere are still checked, on a copy of the stage that is thrown away.
     fn unplaced(&mut self, blocks: &Blocks, catalogue: &Catalogue, built: &Assembled) {
+        let idle = blocks.parts.iter().filter(|(source, _)| !built.placed.contains(&source.name.text));
+        let idle: Vec<_> = idle.collect();
+        if idle.is_empty() {
+            return;
+        }
         let mut scratch = self.clone();
         let mut parts = Vec::new();
-        let idle = blocks.parts.iter().filter(|(source, _)| !built.placed.contains(&source.name.text));
         for (source, used) in idle {
             parts.push(scratch.part(*source, &source.name.text, &catalogue.materials));
             if !used && blocks.assembly.is_some() {

@@ -4,7 +4,7 @@
 //! every dimension of its own, or diagnostics that point at the side. Resolved once: whatever is made from it shares its
 //! dimensions.
 
-use super::dimension::General;
+use super::dimension::{General, trim};
 use super::feature::Names;
 use super::fields::point_dims;
 use super::model::{Corner, DimId, Expr, Outline, OutlinePath, OutlineSide};
@@ -19,8 +19,8 @@ use std::collections::BTreeSet;
 /// More sides than this are a slip of the pen, and would not be checked in time.
 const MAX_SIDES: usize = 200;
 
-/// Names that the faces of prisms and the dimensions of outlines already have.
-const TAKEN: [&str; 3] = ["top", "bottom", "start"];
+/// What the dimensions of the first corner are named under.
+const START: &str = "start";
 
 /// An outline of the part at hand.
 #[derive(Debug, Clone)]
@@ -76,19 +76,36 @@ impl Resolver {
         }
     }
 
-    /// Whether every corner of an outline to be turned lies on the right side of the axis; reports if not.
+    /// Whether an outline to be turned lies on the right side of its axis; reports if not.
     pub fn right_of_axis(&mut self, outline: &Outline, span: Span) -> bool {
+        /// Rounding of an arc that touches the axis (mm).
+        const ON_AXIS: f64 = -1e-9;
         let corners = std::iter::once(&outline.start).chain(outline.sides.iter().map(|s| &s.to));
-        let least = corners.map(|p| self.lowest(&p[0])).fold(f64::INFINITY, f64::min);
-        if least >= 0.0 {
+        let corners = corners.map(|p| self.lowest(&p[0]));
+        let stretches = profile::trace(outline, &self.nominal).unwrap_or_default();
+        let least = corners.chain(stretches.iter().map(profile::Stretch::least_x)).fold(f64::INFINITY, f64::min);
+        if least >= ON_AXIS {
             return true;
         }
-        let message =
-            format!("the outline reaches {} mm beyond the axis it is turned about", super::dimension::trim(-least));
+        let message = format!("the outline reaches {} mm beyond the axis it is turned about", trim(-least));
         self.report(
             Diagnostic::error("E0213", span, message)
                 .label("x is the distance from the axis")
                 .help("keep every x at 0 or above, within its limits too"),
+        );
+        false
+    }
+
+    /// Whether the sides of an outline to be extruded leave the names of its ends free; reports if not.
+    pub fn ends_are_free(&mut self, outline: &Outline, span: Span) -> bool {
+        let Some(side) = outline.sides.iter().find(|s| ["top", "bottom"].contains(&s.name.as_str())) else {
+            return true;
+        };
+        let message = format!("a prism of this outline has two faces named `{}`: a side and an end", side.name);
+        self.report(
+            Diagnostic::error("E0202", span, message)
+                .label("its ends are `top` and `bottom`")
+                .help(format!("give the side another name: `{}_side`", side.name)),
         );
         false
     }
@@ -106,13 +123,13 @@ impl Resolver {
     }
 
     fn read_outline(&mut self, name: &ast::Name, body: &ast::Body, names: &Names) -> Option<Placed> {
-        let start = self.start(name, body, &names.child("start"));
+        let start = self.start(name, body, &names.child(START));
         let mut seen: BTreeSet<&str> = BTreeSet::new();
         let (mut sides, mut spans) = (Vec::new(), Vec::new());
         for line in &body.lines {
             let Stmt::Side(side) = &line.stmt else { continue };
             if let Some(own) = &side.name
-                && (!seen.insert(&own.text) || TAKEN.contains(&own.text.as_str()))
+                && (!seen.insert(&own.text) || own.text == START)
             {
                 self.side_name_taken(own);
             }
@@ -154,8 +171,8 @@ impl Resolver {
     }
 
     fn side_name_taken(&mut self, name: &ast::Name) {
-        let message = match TAKEN.contains(&name.text.as_str()) {
-            true => format!("`{}` is no name for a side: ends and beginnings are called that", name.text),
+        let message = match name.text == START {
+            true => format!("`{START}` is no name for a side: where an outline begins is called that"),
             false => format!("two sides of one outline are named `{}`", name.text),
         };
         self.report(Diagnostic::error("E0202", name.span, message).label("taken").help("choose another name"));
@@ -244,70 +261,96 @@ impl Resolver {
     }
 
     fn report_outline(&mut self, placed: &Placed, fault: Fault, limit: Option<DimId>) {
-        let name = &placed.name;
-        let owner = format!("outline `{}`", name.text);
-        let spoken = |side: usize| match placed.outline.sides.get(side) {
-            Some(s) if s.name.parse::<usize>().is_err() => format!("side `{}`", s.name),
-            Some(_) => format!("side {}", side + 1),
-            None => "the straight side that closes it".to_string(),
-        };
-        let place = |side: usize| placed.sides.get(side).copied().unwrap_or(name.span);
-        let number = |v: f64| format!("{}", (v * 1e3).round() / 1e3);
-        let error = |span, message: String, label: &str| Diagnostic::error("E0213", span, message).label(label);
-        let mut diagnostic = match fault {
-            Fault::NoLength { side } => {
-                error(place(side), format!("{owner}: {} has no length", spoken(side)), "ends where it begins").help(
-                    match side < placed.sides.len() {
-                        true => "remove this side",
-                        false => "write the last corner with the dimensions of the first, or leave it out",
-                    },
-                )
-            }
-            Fault::ShortRadius { side, radius, half } => error(
-                place(side),
-                format!(
-                    "{owner}: the ends of {} are {} mm apart, too far for a radius of {}",
-                    spoken(side),
-                    number(2.0 * half),
-                    number(radius)
-                ),
-                "the arc does not reach",
-            )
-            .help(format!("write `radius {}` or more", number((half * 1e3).ceil() / 1e3))),
-            Fault::BesideArc { side } => error(
-                place(side),
-                format!("{owner}: only a corner between two lines can be broken"),
-                "its corner lies on an arc",
-            )
-            .help("remove the corner's size, and draw what stands there as a side of its own"),
-            Fault::TwoCorners => error(
-                place(placed.sides.len() - 1),
-                format!("{owner}: the last corner is the first one"),
-                "ends where the outline begins",
-            )
-            .help("give the corner's size once, behind `from`"),
-            Fault::NoRoom { side } => error(
-                place(side),
-                format!("{owner}: breaking this corner leaves nothing of a side"),
-                "too large for the sides beside it",
-            )
-            .help("make the corner's size smaller; a full round is an `arc`"),
-            Fault::Touch { sides: [a, b], at } => error(
-                place(b),
-                format!("{owner}: {} meets {} at ({}, {})", spoken(b), spoken(a), number(at[0]), number(at[1])),
-                "meets another side",
-            )
-            .also(place(a), "this one")
-            .help("an outline goes round once, without touching itself"),
-            Fault::Flat => error(name.span, format!("{owner} encloses nothing"), "no area")
-                .help("draw at least three sides, or two with an arc"),
-        };
+        let Told { side, message, label, help } = placed.told(fault);
+        let place = |side: usize| placed.sides.get(side).copied().unwrap_or(placed.name.span);
+        let message = format!("outline `{}`{message}", placed.name.text);
+        let span = side.map_or(placed.name.span, place);
+        let mut diagnostic = Diagnostic::error("E0213", span, message).label(label).help(help);
+        if let Fault::Touch { sides: [other, _], .. } = fault {
+            diagnostic = diagnostic.also(place(other), "this one");
+        }
         if let Some(id) = limit {
             let dim = &self.dims[id.0 as usize];
             diagnostic = diagnostic.also(dim.span, format!("so at a limit of `{}`", dim.name));
         }
         self.report(diagnostic);
     }
+}
+
+/// A fault in words.
+struct Told {
+    /// The side to point at; `None` for the whole outline.
+    side: Option<usize>,
+    message: String,
+    label: &'static str,
+    help: String,
+}
+
+impl Placed {
+    fn told(&self, fault: Fault) -> Told {
+        let told = |side: usize, message: String, label, help: &str| Told {
+            side: Some(side),
+            message: format!(": {message}"),
+            label,
+            help: help.to_string(),
+        };
+        match fault {
+            Fault::NoLength { side } => {
+                let help = match side < self.sides.len() {
+                    true => "remove this side",
+                    false => "write the last corner with the dimensions of the first, or leave it out",
+                };
+                told(side, format!("{} has no length", self.side(side)), "ends where it begins", help)
+            }
+            Fault::ShortRadius { side, radius, half } => {
+                let [apart, radius] = [2.0 * half, radius].map(millimetres);
+                let message =
+                    format!("the ends of {} are {apart} mm apart, too far for a radius of {radius}", self.side(side));
+                let help = format!("write `radius {}` or more", millimetres((half * 1e3).ceil() / 1e3));
+                told(side, message, "the arc does not reach", &help)
+            }
+            Fault::BesideArc { side } => {
+                let message = "only a corner between two lines can be broken".to_string();
+                let help = "remove the corner's size, and draw what stands there as a side of its own";
+                told(side, message, "its corner lies on an arc", help)
+            }
+            Fault::TwoCorners => {
+                let message = "the last corner is the first one".to_string();
+                let help = "give the corner's size once, behind `from`";
+                told(self.sides.len() - 1, message, "ends where the outline begins", help)
+            }
+            Fault::NoRoom { side } => {
+                let message = "breaking this corner leaves nothing of a side".to_string();
+                let help = "make the corner's size smaller; a full round is an `arc`";
+                told(side, message, "too large for the sides beside it", help)
+            }
+            Fault::Touch { sides: [a, b], at } => {
+                let [x, y] = at.map(millimetres);
+                let message = format!("{} meets {} at ({x}, {y})", self.side(b), self.side(a));
+                told(b, message, "meets another side", "an outline goes round once, without touching itself")
+            }
+            Fault::Flat => Told {
+                side: None,
+                message: " encloses nothing".to_string(),
+                label: "no area",
+                help: "draw at least three sides, or two with an arc".to_string(),
+            },
+        }
+    }
+
+    /// What a side is called in a message.
+    fn side(&self, side: usize) -> String {
+        match self.outline.sides.get(side) {
+            Some(s) if s.name != (side + 1).to_string() => format!("side `{}`", s.name),
+            Some(_) => format!("side {}", side + 1),
+            None => "the straight side that closes it".to_string(),
+        }
+    }
+}
+
+/// A length in a message, to the micrometre.
+fn millimetres(v: f64) -> f64 {
+    (v * 1e3).round() / 1e3
 }
 
 /// The dimensions of an outline, each once.

@@ -114,6 +114,13 @@ impl Stretch {
         }
     }
 
+    /// The smallest x on it.
+    pub fn least_x(&self) -> f64 {
+        let ends = self.from[0].min(self.to[0]);
+        let pole = self.bend.map(|b| [b.centre[0] - b.radius, b.centre[1]]);
+        pole.filter(|p| self.holds(*p)).map_or(ends, |p| p[0].min(ends))
+    }
+
     /// Whether `p`, which lies on its line or circle, lies between its ends.
     fn holds(&self, p: Point) -> bool {
         if near(p, self.from) || near(p, self.to) {

@@ -37,7 +37,8 @@ impl Resolver {
             "prism" => {
                 reader.known(&["outline", "h"]);
                 let (outline, h) = (reader.outline(), reader.extent("h"));
-                Some(Shape::Prism { outline: outline?, h: h? })
+                let (outline, h, span) = (outline?, h?, reader.span_of("outline"));
+                self.ends_are_free(&outline, span).then_some(Shape::Prism { outline, h })
             }
             "revolve" => reader.revolve(),
             "hole" => reader.hole(),

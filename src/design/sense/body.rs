@@ -103,7 +103,15 @@ impl Leaf<'_> {
         let (form, names) = form(self.shape, values)?;
         let stretches = form.stretches();
         let outwards = profile::area(stretches).signum();
-        Some(Placed { to_local: pose.inverse(), pose, reach: form.reach(), form, names, outwards })
+        Some(Placed {
+            to_local: pose.inverse(),
+            pose,
+            reach: form.reach(),
+            radius: form.radius(),
+            form,
+            names,
+            outwards,
+        })
     }
 }
 
@@ -118,6 +126,8 @@ pub struct Placed {
     outwards: f64,
     /// No point of it lies farther from its origin (mm); infinite when it goes through.
     reach: f64,
+    /// Nor farther from its z axis (mm).
+    radius: f64,
 }
 
 enum Form {
@@ -149,14 +159,15 @@ impl Placed {
 
     fn holds(&self, p: &Point3<f64>) -> bool {
         let p = self.to_local * p;
-        if p.coords.norm_squared() > self.reach * self.reach {
+        let rho = p.x.hypot(p.y);
+        if rho > self.radius {
             return false;
         }
         match &self.form {
             Form::Prism(outline, height) => {
                 height.is_none_or(|h| (0.0..=h).contains(&p.z)) && profile::encloses(outline, [p.x, p.y])
             }
-            Form::Turned(outline) => profile::encloses(outline, [p.x.hypot(p.y), p.z]),
+            Form::Turned(outline) => profile::encloses(outline, [rho, p.z]),
         }
     }
 
@@ -218,14 +229,25 @@ impl Form {
     }
 
     fn reach(&self) -> f64 {
-        let [low, high] = box_round(self.stretches());
-        let far = |k: usize| f64::max(low[k].abs(), high[k].abs());
         match self {
             Form::Prism(_, None) => f64::INFINITY,
-            Form::Prism(_, Some(h)) => far(0).hypot(far(1)).hypot(*h),
-            Form::Turned(_) => far(0).hypot(far(1)),
+            Form::Prism(_, Some(h)) => self.radius().hypot(*h),
+            Form::Turned(outline) => self.radius().hypot(farthest(outline, 1)),
         }
     }
+
+    fn radius(&self) -> f64 {
+        match self {
+            Form::Prism(outline, _) => farthest(outline, 0).hypot(farthest(outline, 1)),
+            Form::Turned(outline) => farthest(outline, 0),
+        }
+    }
+}
+
+/// No point of the stretches has a larger coordinate, x (0) or y (1), of either sign.
+fn farthest(outline: &[Stretch], axis: usize) -> f64 {
+    let [low, high] = box_round(outline);
+    low[axis].abs().max(high[axis].abs())
 }
 
 /// Corners of a box round the stretches, arcs with their whole circles.

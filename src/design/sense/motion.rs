@@ -17,9 +17,9 @@ const STEP: f64 = 0.1;
 /// Speeds below this share of the greatest are rounding.
 const STILL: f64 = 1e-4;
 /// Points per face, unless there are too many faces.
-const SAMPLES: usize = 24;
+const SAMPLES: usize = 16;
 /// Membership questions to primitives per part, which bounds the time that large patterns take.
-const BUDGET: usize = 20_000_000;
+const BUDGET: usize = 10_000_000;
 /// And per dimension, so that one does not take what the others need.
 const BUDGET_EACH: usize = 2_000_000;
 
