@@ -72,8 +72,9 @@ fn many_features_that_move_are_judged_within_a_budget() {
 #[test]
 fn outlines_of_many_sides_are_checked_or_refused() {
     let outline = |sides: usize| {
-        let step =
-            |i: usize| format!("        line to ({} ±0.01, {} ±0.01)\n", 10 * (i + 1), if i % 2 == 0 { 3 } else { 5 });
+        let step = |i: usize| {
+            format!("        line to ({} ±0.01, {} ±0.01)\n", 10 * (i + 1), if i.is_multiple_of(2) { 3 } else { 5 })
+        };
         let up: String = (0..sides - 2).map(step).collect();
         let end = format!("        line to ({}, -5)\n        line to (0, -5)\n", 10 * sides);
         format!("    outline saw {{\n        from (0, 5)\n{up}{end}    }}\n    add saw = prism(outline = saw, h = 3)\n")
