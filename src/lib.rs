@@ -22,6 +22,8 @@ pub mod assembly;
 #[cfg(feature = "compile")]
 pub mod design;
 #[cfg(feature = "compile")]
+pub mod exchange;
+#[cfg(feature = "compile")]
 pub mod render;
 #[cfg(feature = "compile")]
 pub mod scene;
@@ -80,6 +82,7 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     let shapes = line.accept(line::shapes(&design))?;
     let solids = line::per_component(&design, &shapes);
     line.emit(Artifact::Brep, || artifacts::brep(&design, &shapes));
+    line.emit_files(Artifact::Step, || artifacts::exchange::step(&design, &solids));
 
     line.enter(Stage::Assembly)?;
     let analysis = line.check(assembly::analyse(&design, &solids))?;
@@ -92,7 +95,7 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     let choice = view::choose::choose(&design, station, &bodies, &view::choose::targets(&trees));
     let camera = line.check((choice.camera, choice.diagnostics.clone()))?;
     line.emit(Artifact::View, || artifacts::view(&design, station, &choice));
-    line.emit_images(|| artifacts::images::pictures(&design, station, &camera, &modes));
+    line.emit_files(Artifact::Images, || artifacts::images::pictures(&design, station, &camera, &modes));
 
     line.enter(Stage::Plan)?;
     let (spec, datum) = (line::digest(&design), line::datum(&design, &analysis.liaison, &modes));

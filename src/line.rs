@@ -153,11 +153,13 @@ impl<'a> Line<'a> {
         self.emit(Artifact::ErrorTrees, || artifacts::error_trees(design, trees));
         self.emit(Artifact::ObjectTree, || artifacts::object_tree(design, trees));
         self.emit(Artifact::Insertion, || artifacts::insertion(design, solids, analysis));
+        self.emit_files(Artifact::Gltf, || artifacts::exchange::gltf(design, solids, analysis));
     }
 
-    pub fn emit_images(&mut self, pictures: impl FnOnce() -> Vec<(String, Vec<u8>)>) {
-        if self.options.wanted.contains(&Artifact::Images) {
-            self.out.artifacts.extend(pictures());
+    /// Keeps an artifact of several files, or of other than text, if it is wanted.
+    pub fn emit_files(&mut self, artifact: Artifact, files: impl FnOnce() -> Vec<(String, Vec<u8>)>) {
+        if self.options.wanted.contains(&artifact) {
+            self.out.artifacts.extend(files());
         }
     }
 }

@@ -204,6 +204,19 @@ fn emitted_stages_lie_beside_the_model_that_was_not_asked_for() {
 }
 
 #[test]
+fn solids_leave_as_step_and_gltf() {
+    let folder = Folder::new("exchange");
+    folder.file("plate.gng", spec());
+    folder.run(&["compile", "plate.gng", "--emit", "step,gltf"]).expect(0, &[]);
+    let names = folder.names();
+    for name in ["plate.step", "plate.parts", "plate.glb", "plate.exploded.glb"] {
+        assert!(names.contains(&name.to_string()), "{names:?}");
+    }
+    let text = folder.read("plate.step");
+    assert!(text.starts_with("ISO-10303-21;") && text.contains("NEXT_ASSEMBLY_USAGE_OCCURRENCE"), "{text}");
+}
+
+#[test]
 fn a_place_that_cannot_be_written_is_found_out_before_the_work() {
     let folder = Folder::new("unwritable");
     folder.file("plate.gng", spec());

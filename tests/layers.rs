@@ -15,6 +15,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("variation", &["design", "rng", "units"]),
     ("solid", &["design", "diag", "units"]),
     ("assembly", &["solid", "variation", "design", "diag", "units"]),
+    ("exchange", &["assembly", "solid", "design"]),
     ("scene", &["assembly", "solid", "variation", "design", "runtime", "diag", "units", "rng"]),
     ("view", &["scene", "assembly", "solid", "design", "runtime", "diag", "units"]),
     ("render", &["scene", "solid", "design", "runtime", "units", "rng"]),
@@ -23,7 +24,10 @@ const HOUSE: &[(&str, &[&str])] = &[
         &["view", "render", "scene", "assembly", "solid", "variation", "design", "runtime", "diag", "units", "rng"],
     ),
     ("golden", &[]),
-    ("artifacts", &["line", "train", "view", "render", "scene", "assembly", "solid", "design", "runtime", "units"]),
+    (
+        "artifacts",
+        &["line", "train", "view", "render", "scene", "exchange", "assembly", "solid", "design", "runtime", "units"],
+    ),
     (
         "line",
         &["artifacts", "train", "view", "render", "scene", "assembly", "solid", "design", "runtime", "diag", "units"],

@@ -3,6 +3,7 @@
 //! In: the outputs of the stages. Out: RON in the user's names, lengths in mm, angles in degrees, numbers rounded to what
 //! matters. Summaries, not dumps: a golden of more than 20 KiB is a golden nobody reads. Never changes what it is shown.
 
+pub mod exchange;
 pub mod images;
 
 use crate::assembly::Analysis;
@@ -34,13 +35,14 @@ pub enum Artifact {
     ErrorTrees,
     ObjectTree,
     Insertion,
+    Gltf,
     View,
     Images,
     Model,
 }
 
 impl Artifact {
-    pub const ALL: [Artifact; 11] = [
+    pub const ALL: [Artifact; 12] = [
         Artifact::Design,
         Artifact::Brep,
         Artifact::Step,
@@ -49,6 +51,7 @@ impl Artifact {
         Artifact::ErrorTrees,
         Artifact::ObjectTree,
         Artifact::Insertion,
+        Artifact::Gltf,
         Artifact::View,
         Artifact::Images,
         Artifact::Model,
@@ -65,6 +68,7 @@ impl Artifact {
             Artifact::ErrorTrees => "error-trees",
             Artifact::ObjectTree => "object-tree",
             Artifact::Insertion => "insertion",
+            Artifact::Gltf => "gltf",
             Artifact::View => "view",
             Artifact::Images => "images",
             Artifact::Model => "model",
@@ -84,7 +88,8 @@ impl Artifact {
             | Artifact::Liaison
             | Artifact::ErrorTrees
             | Artifact::ObjectTree
-            | Artifact::Insertion => Stage::Assembly,
+            | Artifact::Insertion
+            | Artifact::Gltf => Stage::Assembly,
             Artifact::View | Artifact::Images => Stage::View,
             Artifact::Model => Stage::Verify,
         }
