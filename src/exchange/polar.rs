@@ -166,7 +166,7 @@ mod tests {
         let axis = Unit::new_normalize(Vector3::new(0.2, -0.4, 0.9));
         let c = Point3::new(1.0, 2.0, 3.0);
         for s in [
-            Surface::Sphere { centre: c, radius: 4.0 },
+            Surface::Sphere { centre: c, radius: 4.0, axis },
             Surface::Torus { centre: c, axis, major: 5.0, minor: 2.0 },
             Surface::Torus { centre: c, axis, major: -1.0, minor: 2.0 },
         ] {

@@ -125,7 +125,8 @@ impl<'a> Seamstress<'a> {
             |edge: &Edge| if let Curve::Circle { centre, axis, .. } = edge.curve { Some((centre, axis)) } else { None };
         let circles: Vec<(Point3<f64>, UnitVector3<f64>)> = arcs().filter_map(circle).collect();
         let upright = [Vector3::z_axis(), Vector3::x_axis(), Vector3::y_axis()];
-        let axes = circles.iter().map(|c| c.1).take(CIRCLES).chain(upright).chain(directions(AXES));
+        let axes =
+            circles.iter().map(|c| c.1).take(CIRCLES).chain([surface.axis()]).chain(upright).chain(directions(AXES));
         let plan = |axis: UnitVector3<f64>| {
             let polar = Polar::new(surface, Some(axis))?;
             let slanted =
