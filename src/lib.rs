@@ -22,6 +22,8 @@ pub mod assembly;
 #[cfg(feature = "compile")]
 pub mod design;
 #[cfg(feature = "compile")]
+pub mod drawing;
+#[cfg(feature = "compile")]
 pub mod exchange;
 #[cfg(feature = "compile")]
 pub mod render;

@@ -1,7 +1,7 @@
 //! What travels down the line beside the work itself: options, diagnostics, artifacts, progress; and the small joints
 //! between one stage's output and the next one's input.
 
-use crate::artifacts::{self, Artifact};
+use crate::artifacts::{self, Artifact, pictures};
 use crate::assembly::Analysis;
 use crate::assembly::error_tree::ErrorTree;
 use crate::assembly::fault::{self, ErrorMode, FaultKind};
@@ -154,6 +154,10 @@ impl<'a> Line<'a> {
         self.emit(Artifact::ObjectTree, || artifacts::object_tree(design, trees));
         self.emit(Artifact::Insertion, || artifacts::insertion(design, solids, analysis));
         self.emit_files(Artifact::Gltf, || artifacts::exchange::gltf(design, solids, analysis));
+        self.emit_files(Artifact::Liaison, || pictures::liaison(design, solids, analysis));
+        self.emit_files(Artifact::ErrorTrees, || pictures::error_trees(design, solids, analysis, trees));
+        self.emit_files(Artifact::ObjectTree, || pictures::object_tree(design, solids, analysis, trees));
+        self.emit_files(Artifact::Exploded, || pictures::exploded(design, solids, analysis));
     }
 
     /// Keeps an artifact of several files, or of other than text, if it is wanted.

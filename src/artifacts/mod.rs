@@ -5,6 +5,7 @@
 
 pub mod exchange;
 pub mod images;
+pub mod pictures;
 
 use crate::assembly::Analysis;
 use crate::assembly::contact::{Contact, FaceRef};
@@ -36,13 +37,14 @@ pub enum Artifact {
     ObjectTree,
     Insertion,
     Gltf,
+    Exploded,
     View,
     Images,
     Model,
 }
 
 impl Artifact {
-    pub const ALL: [Artifact; 12] = [
+    pub const ALL: [Artifact; 13] = [
         Artifact::Design,
         Artifact::Brep,
         Artifact::Step,
@@ -52,6 +54,7 @@ impl Artifact {
         Artifact::ObjectTree,
         Artifact::Insertion,
         Artifact::Gltf,
+        Artifact::Exploded,
         Artifact::View,
         Artifact::Images,
         Artifact::Model,
@@ -69,6 +72,7 @@ impl Artifact {
             Artifact::ObjectTree => "object-tree",
             Artifact::Insertion => "insertion",
             Artifact::Gltf => "gltf",
+            Artifact::Exploded => "exploded",
             Artifact::View => "view",
             Artifact::Images => "images",
             Artifact::Model => "model",
@@ -89,15 +93,21 @@ impl Artifact {
             | Artifact::ErrorTrees
             | Artifact::ObjectTree
             | Artifact::Insertion
-            | Artifact::Gltf => Stage::Assembly,
+            | Artifact::Gltf
+            | Artifact::Exploded => Stage::Assembly,
             Artifact::View | Artifact::Images => Stage::View,
             Artifact::Model => Stage::Verify,
         }
     }
 
+    /// `error_trees`
+    pub fn stem(self) -> String {
+        self.name().replace('-', "_")
+    }
+
     /// `error_trees.ron`
     pub fn file(self) -> String {
-        format!("{}.ron", self.name().replace('-', "_"))
+        format!("{}.ron", self.stem())
     }
 }
 

@@ -67,9 +67,11 @@ fn outputs(spec: &Path, args: &GoldenArgs, global: &Global) -> Result<Option<BTr
     Ok(Some(texts(&compiled)))
 }
 
+/// The RON of every stage; pictures and data for other programs say the same in another form.
 fn texts(compiled: &Compiled) -> BTreeMap<String, String> {
     let text = |bytes: &Vec<u8>| String::from_utf8(bytes.clone()).ok();
-    let artifacts = compiled.artifacts.iter().filter_map(|(name, bytes)| Some((name.clone(), text(bytes)?)));
+    let reviewed = compiled.artifacts.iter().filter(|(name, _)| name.ends_with(".ron"));
+    let artifacts = reviewed.filter_map(|(name, bytes)| Some((name.clone(), text(bytes)?)));
     let model = compiled.model.iter().map(|m| (Artifact::Model.file(), artifacts::model_summary(m)));
     artifacts.chain(model).collect()
 }

@@ -1,0 +1,1 @@
+//! Pictures of assemblies that are not the pattern wheel.
