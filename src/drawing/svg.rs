@@ -98,7 +98,7 @@ impl Svg {
 
     /// A line of text whose base line begins, is centred or ends at `at`; `size` in px.
     pub fn text(&mut self, at: Point, anchor: Anchor, size: f64, text: &str, attributes: &str) {
-        let width = text_width(text, size);
+        let width = if attributes.contains("bold") { bold_width(text, size) } else { text_width(text, size) };
         let left = match anchor {
             Anchor::Start => at[0],
             Anchor::Middle => at[0] - width / 2.0,
@@ -243,6 +243,12 @@ pub fn escaped(text: &str) -> String {
 /// How wide a text is at most (px) in the sans-serif fonts in use, at a size in px.
 pub fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(char_width).sum::<f64>() * size * WIDEST_FONT
+}
+
+/// The same in bold.
+pub fn bold_width(text: &str, size: f64) -> f64 {
+    const BOLDER: f64 = 1.12;
+    BOLDER * text_width(text, size)
 }
 
 /// Advance widths of Helvetica in ems, to about 0.05.

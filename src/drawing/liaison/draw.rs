@@ -4,15 +4,16 @@
 //! at a crossing the eye keeps its wire.
 
 use super::super::ink::{self, BLACK, Class, GREY, HEADING, NOTE, PAPER, TEXT};
-use super::super::svg::{Anchor, Path, Svg};
+use super::super::svg::{Anchor, Path, Point, Svg};
 use super::graph::{Graph, Row, Wire};
 use super::order::{Hop, Net};
 use super::place::{HEAD, INSET, Layout};
 
 /// Control points of a wire's bends, as a share of the gutter.
 const BEND: f64 = 0.5;
-/// Width of the white under a wire (px).
+/// Width of the white under a wire (px), and the share of a gutter at its ends that goes without.
 const HALO: f64 = 4.5;
+const MEETING: f64 = 0.2;
 /// Corners of the boxes (px).
 const CORNER: f64 = 7.0;
 /// From the drawing to the title above and to the legend below (px).
@@ -25,7 +26,8 @@ const BASE: f64 = 0.36;
 pub(super) fn draw(name: &str, graph: &Graph, net: &Net, layout: &Layout) -> String {
     let mut svg = Svg::default();
     for (wire, hops) in graph.wires.iter().zip(&net.hops) {
-        svg.named(&wire.note, |svg| draw_wire(svg, wire, &course(net, layout, hops)));
+        svg.path(&halo(net, layout, hops), &format!("fill=\"none\" stroke=\"#fff\" stroke-width=\"{HALO}\""));
+        svg.named(&wire.note, |svg| svg.path(&course(net, layout, hops), &ink::wire(wire.class)));
     }
     let boxes = || (0..net.slots.len()).filter_map(|s| Some((s, net.slots[s].block?)));
     svg.group(&format!("stroke=\"{BLACK}\""), |svg| {
@@ -45,24 +47,48 @@ pub(super) fn draw(name: &str, graph: &Graph, net: &Net, layout: &Layout) -> Str
 
 /// The wire from circle to circle, straight where it passes a column.
 fn course(net: &Net, layout: &Layout, hops: &[Hop]) -> Path {
-    let column = |hop: &Hop| layout.columns[net.slots[hop.slot].layer];
     let mut path = Path::default();
-    path.move_to([column(&hops[0])[1], layout.y(&hops[0])]);
-    for pair in hops.windows(2) {
-        let ([x0, x1], [y0, y1]) =
-            ([column(&pair[0])[1], column(&pair[1])[0]], [&pair[0], &pair[1]].map(|h| layout.y(h)));
-        let bend = (x1 - x0) * BEND;
-        path.curve_to([[x0 + bend, y0], [x1 - bend, y1]], [x1, y1]);
-        if net.slots[pair[1].slot].block.is_none() {
-            path.line_to([column(&pair[1])[1], y1]);
+    for (i, pair) in hops.windows(2).enumerate() {
+        let [from, a, b, to] = gutter(net, layout, pair);
+        if i == 0 {
+            path.move_to(from)
+        } else {
+            path.line_to(from)
         }
+        path.curve_to([a, b], to);
     }
     path
 }
 
-fn draw_wire(svg: &mut Svg, wire: &Wire, course: &Path) {
-    svg.path(course, &format!("fill=\"none\" stroke=\"#fff\" stroke-width=\"{HALO}\""));
-    svg.path(course, &ink::wire(wire.class));
+/// The white under a wire: not near the circles, where wires meet on purpose.
+fn halo(net: &Net, layout: &Layout, hops: &[Hop]) -> Path {
+    let mut path = Path::default();
+    for pair in hops.windows(2) {
+        let [from, a, b, to] = part(gutter(net, layout, pair), MEETING, 1.0 - MEETING);
+        path.move_to(from);
+        path.curve_to([a, b], to);
+    }
+    path
+}
+
+/// A wire between two columns, as a cubic curve: its ends and what is between.
+fn gutter(net: &Net, layout: &Layout, pair: &[Hop]) -> [Point; 4] {
+    let column = |hop: &Hop| layout.columns[net.slots[hop.slot].layer];
+    let [x0, x1] = [column(&pair[0])[1], column(&pair[1])[0]];
+    let [y0, y1] = [layout.y(&pair[0]), layout.y(&pair[1])];
+    let bend = (x1 - x0) * BEND;
+    [[x0, y0], [x0 + bend, y0], [x1 - bend, y1], [x1, y1]]
+}
+
+/// The part of a cubic curve between two parameters (its blossom, by de Casteljau).
+fn part(curve: [Point; 4], from: f64, to: f64) -> [Point; 4] {
+    let mix = |a: Point, b: Point, t: f64| [0, 1].map(|i| a[i] + (b[i] - a[i]) * t);
+    let blossom = |[r, s, t]: [f64; 3]| {
+        let [a, b, c] = [0, 1, 2].map(|i| mix(curve[i], curve[i + 1], r));
+        let [a, b] = [mix(a, b, s), mix(b, c, s)];
+        mix(a, b, t)
+    };
+    [[from; 3], [from, from, to], [from, to, to], [to; 3]].map(blossom)
 }
 
 /// How many contacts a wire stands for, where it begins.

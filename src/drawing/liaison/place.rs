@@ -5,7 +5,7 @@
 
 use super::super::ink::{HEADING, TEXT};
 use super::super::spread::spread;
-use super::super::svg::{Point, text_width};
+use super::super::svg::{Point, bold_width, text_width};
 use super::graph::Graph;
 use super::order::{Hop, Net};
 use std::collections::BTreeMap;
@@ -91,7 +91,7 @@ fn columns(graph: &Graph, net: &Net) -> Vec<[f64; 2]> {
 fn width(graph: &Graph, block: usize) -> f64 {
     let block = &graph.boxes[block];
     let rows = block.rows.iter().map(|r| text_width(&r.label, TEXT));
-    rows.fold(text_width(&block.name, HEADING), f64::max) + 2.0 * INSET
+    rows.fold(bold_width(&block.name, HEADING), f64::max) + 2.0 * INSET
 }
 
 /// Least distance between the upper borders of slots that follow each other.

@@ -5,9 +5,10 @@
 //! follow each other, because the trees are breadth-first.
 
 use super::super::ink::{self, BLACK, Class, Entry, GREY, HEADING, NOTE, PAPER, Sample, TEXT, is_round};
-use super::super::svg::{Anchor, Path, Svg, text_width};
+use super::super::svg::{Anchor, Path, Svg, bold_width, text_width};
 use super::tidy::{Gaps, tidy};
 use super::{Source, data};
+use crate::assembly::contact::{Contact, FaceRef};
 use crate::assembly::error_tree::ErrorTree;
 use crate::design::model::Design;
 
@@ -28,7 +29,7 @@ const CORNER: f64 = 6.0;
 const GUTTER: f64 = 84.0;
 /// Between nodes of error trees, and of the object tree, which has hundreds (px).
 const ROOMY: Gaps = Gaps { siblings: 16.0, families: 26.0 };
-const DENSE: Gaps = Gaps { siblings: 4.0, families: 8.0 };
+const DENSE: Gaps = Gaps { siblings: 4.0, families: 14.0 };
 /// A loop inside a level bends into the gutter by this share of its height, and at most this far (px).
 const LOOP: [f64; 2] = [0.35, 72.0];
 /// From the tree to the title above and to the legend below (px).
@@ -131,7 +132,7 @@ fn node(source: &Source, tree: &ErrorTree, at: usize) -> Node {
 /// The root's surfaces that touch something.
 fn own_surfaces(source: &Source, tree: &ErrorTree) -> Vec<Row> {
     let root = &tree.nodes[0];
-    let row = |face: &crate::assembly::contact::FaceRef| {
+    let row = |face: &FaceRef| {
         let round = source.liaison.of(face.component).any(|c| c.on(face.component) == Some(*face) && is_round(c));
         let text = source.solids[face.component].faces[face.face].name.clone();
         Row { text, round: Some(round), class: None }
@@ -141,7 +142,7 @@ fn own_surfaces(source: &Source, tree: &ErrorTree) -> Vec<Row> {
 
 fn ways(source: &Source, tree: &ErrorTree, at: usize) -> Vec<Row> {
     let contacts = data::contacts(source, tree, at);
-    let row = |(way, (contact, _)): (data::Way, (&crate::assembly::contact::Contact, _))| Row {
+    let row = |(way, (contact, _)): (data::Way, (&Contact, _))| Row {
         text: format!("{} → {}", way.from, way.to),
         round: Some(is_round(contact)),
         class: Some(Class::of(contact)),
@@ -163,7 +164,7 @@ impl Node {
 
     fn width(&self) -> f64 {
         let rows = self.rows.iter().map(|r| text_width(&r.text, NOTE));
-        rows.fold(text_width(&self.name, TEXT), f64::max) + 2.0 * INSET
+        rows.fold(bold_width(&self.name, TEXT), f64::max) + 2.0 * INSET
     }
 
     fn top(&self) -> f64 {

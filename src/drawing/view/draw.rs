@@ -6,6 +6,7 @@
 use super::super::ink::{BLACK, GREY, HEADING, NOTE, TEXT};
 use super::super::svg::{Anchor, Path, Point, Svg};
 use super::Item;
+use super::anchor::{Piece, anchors};
 use super::hidden::Covers;
 use super::label::{self, Seen, Side};
 use super::lines::{self, Circle, Line, Weight};
@@ -42,18 +43,15 @@ pub(super) fn draw(title: &str, items: &[Item], paths: &[[Point3<f64>; 2]]) -> S
     let covers = Covers::new(items.iter().flat_map(|item| triangles(item, &projection)));
     let page = Page::around(all.iter().flatten());
     let mut svg = Svg::default();
-    let mut seen = Vec::new();
-    let mut unseen = Vec::new();
-    for (item, lines) in items.iter().zip(&all) {
-        let runs: Vec<Run> = lines.iter().flat_map(|l| page.runs(l, &covers)).collect();
-        match page.ends(&runs) {
-            Some([left, right]) => seen.push(Seen { name: item.name, left, right }),
-            None => unseen.push(item.name),
-        }
-        svg.named(item.name, |svg| draw_runs(svg, &page, &runs));
-    }
+    let runs = |lines: &Vec<Line>| -> Vec<Run> { lines.iter().flat_map(|l| page.runs(l, &covers)).collect() };
+    let runs: Vec<Vec<Run>> = all.iter().map(runs).collect();
+    items.iter().zip(&runs).for_each(|(item, runs)| svg.named(item.name, |svg| draw_runs(svg, &page, runs)));
     svg.group(&chain(), |svg| paths.iter().for_each(|path| draw_path(svg, &page, &projection, path, &covers)));
-    name_parts(&mut svg, &seen);
+    let anchors = anchors(&pieces(&page, &runs), items.len());
+    let named = || items.iter().zip(&anchors);
+    let seen = named().filter_map(|(item, at)| at.map(|[left, right]| Seen { name: item.name, left, right }));
+    name_parts(&mut svg, &seen.collect::<Vec<_>>());
+    let unseen: Vec<&str> = named().filter(|(_, at)| at.is_none()).map(|(item, _)| item.name).collect();
     surround(&mut svg, title, &unseen);
     svg.finish(title)
 }
@@ -119,14 +117,14 @@ impl Page {
     fn goes_on(&self, run: &[Point3<f64>], from: &Point3<f64>) -> bool {
         run.last().is_some_and(|end| self.length(&[*end, *from]) < SPECK)
     }
+}
 
-    /// The leftmost and the rightmost point of some runs.
-    fn ends(&self, runs: &[Run]) -> Option<[Point; 2]> {
-        let points = || runs.iter().flat_map(|r| &r.points).map(|p| self.px(p));
-        let left = points().min_by(|a, b| a[0].total_cmp(&b[0]))?;
-        let right = points().max_by(|a, b| a[0].total_cmp(&b[0]))?;
-        Some([left, right])
-    }
+/// What is seen of every part, piece by piece.
+fn pieces(page: &Page, runs: &[Vec<Run>]) -> Vec<Piece> {
+    let of_run = |part: usize, run: &Run| -> Vec<Piece> {
+        run.points.windows(2).map(|p| Piece { part, ends: [page.px(&p[0]), page.px(&p[1])] }).collect()
+    };
+    runs.iter().enumerate().flat_map(|(part, runs)| runs.iter().flat_map(move |r| of_run(part, r))).collect()
 }
 
 fn draw_runs(svg: &mut Svg, page: &Page, runs: &[Run]) {

@@ -1,10 +1,12 @@
 //! Names beside a drawing, each with a leader to its part.
 //!
-//! In: for every name the leftmost and the rightmost point seen of its part. Out: on which side and how high each name
+//! In: for every name the best points of its part for a leader to the left and to the right. Out: on which side and how high each name
 //! stands, so that names do not overlap and leaders of one side do not cross.
 
 use super::super::spread::spread;
 use super::super::svg::Point;
+use super::anchor::Anchor;
+use std::cmp::Ordering;
 
 /// Between the base lines of two names (px).
 const LINE: f64 = 17.0;
@@ -16,8 +18,8 @@ const PASSES: usize = 50;
 /// What is seen of a part.
 pub(super) struct Seen<'a> {
     pub name: &'a str,
-    pub left: Point,
-    pub right: Point,
+    pub left: Anchor,
+    pub right: Anchor,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,32 +55,31 @@ pub(super) fn labels<'a>(seen: &[Seen<'a>], borders: [f64; 2], away: f64) -> Vec
     labels
 }
 
-/// Parts off the middle are named on their own side, the others where fewer names stand.
+/// A part is named on the side where less is in the way, else on its own side, else where fewer names stand.
 fn sides<'a>(seen: &[Seen<'a>], borders: [f64; 2]) -> Vec<Label<'a>> {
     let (middle, width) = ((borders[0] + borders[1]) / 2.0, borders[1] - borders[0]);
-    let off = |s: &Seen| ((s.left[0] + s.right[0]) / 2.0 - middle) / width.max(1.0);
-    let counts = [seen.iter().filter(|s| off(s) < -CENTRAL).count(), seen.iter().filter(|s| off(s) > CENTRAL).count()];
-    let mut counts = counts;
-    let side = |s: &Seen| match off(s) {
-        o if o > CENTRAL => Side::Right,
-        o if o < -CENTRAL => Side::Left,
-        _ if counts[0] < counts[1] => {
-            counts[0] += 1;
-            Side::Left
-        }
-        _ => {
-            counts[1] += 1;
-            Side::Right
+    let fixed = |s: &Seen| {
+        let off = ((s.left.at[0] + s.right.at[0]) / 2.0 - middle) / width.max(1.0);
+        match s.left.crossed.cmp(&s.right.crossed) {
+            Ordering::Less => Some(Side::Left),
+            Ordering::Greater => Some(Side::Right),
+            Ordering::Equal if off < -CENTRAL => Some(Side::Left),
+            Ordering::Equal if off > CENTRAL => Some(Side::Right),
+            Ordering::Equal => None,
         }
     };
-    let chosen: Vec<Side> = seen.iter().map(side).collect();
-    let label = |(s, side): (&Seen<'a>, Side)| Label {
-        name: s.name,
-        side,
-        anchor: if side == Side::Left { s.left } else { s.right },
-        y: 0.0,
+    let count = |side| seen.iter().filter(|s| fixed(s) == Some(side)).count();
+    let mut counts = [count(Side::Left), count(Side::Right)];
+    let mut freely = || {
+        let fewer = usize::from(counts[1] <= counts[0]);
+        counts[fewer] += 1;
+        [Side::Left, Side::Right][fewer]
     };
-    seen.iter().zip(chosen).map(label).collect()
+    let label = |s: &Seen<'a>| {
+        let side = fixed(s).unwrap_or_else(&mut freely);
+        Label { name: s.name, side, anchor: if side == Side::Left { s.left.at } else { s.right.at }, y: 0.0 }
+    };
+    seen.iter().map(label).collect()
 }
 
 /// Exchanges the places of neighbours whose leaders cross. `x` is where the leaders begin.
@@ -111,7 +112,8 @@ mod tests {
     use super::*;
 
     fn seen(name: &str, x: f64, y: f64) -> Seen<'_> {
-        Seen { name, left: [x - 1.0, y], right: [x + 1.0, y] }
+        let at = |x: f64| Anchor { at: [x, y], crossed: 0 };
+        Seen { name, left: at(x - 1.0), right: at(x + 1.0) }
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! the parts beside the drawing; `draw` writes. Wide lines are outlines (one of the two faces is seen), narrow ones edges
 //! between two seen faces, as in technical illustration; the narrow chain lines of the exploded view are the paths of insertion.
 
+mod anchor;
 mod draw;
 mod hidden;
 mod label;

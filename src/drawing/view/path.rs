@@ -1,8 +1,9 @@
-//! The paths along which components go in.
+//! The lines along which an assembly comes apart: from each fit to the feature it belongs to.
 //!
-//! In: solids, where they stand assembled and how far they are moved apart, their contacts. Out: straight lines in the
-//! assembly's frame, each drawn once where components share one.
+//! In: solids, where they stand assembled, how far each is moved, their contacts. Out: straight lines in the assembly's frame,
+//! each drawn once where several share an axis.
 
+use crate::assembly::contact::Contact;
 use crate::assembly::liaison::Liaison;
 use crate::solid::Solid;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
@@ -10,7 +11,7 @@ use std::sync::Arc;
 
 /// Lines nearer to each other than this (mm) are one, and axes this parallel (sine).
 const SAME: f64 = 1e-3;
-/// A component that moves less than this (mm) has no path.
+/// What moves less than this (mm) does not move.
 const STILL: f64 = 1e-6;
 
 /// A stretch of a line: from where to where along a direction through a point.
@@ -20,8 +21,23 @@ struct Track {
     reach: [f64; 2],
 }
 
-/// From where each component rests to where it is drawn: through the axis of the fit it goes into, where it has but one,
-/// else through its middle.
+impl Track {
+    /// From `low` to `high` along `along` (mm from the origin), through a point.
+    fn new(through: &Point3<f64>, along: Unit<Vector3<f64>>, reach: [f64; 2]) -> Track {
+        Track { foot: through - along.into_inner() * through.coords.dot(&along), along, reach }
+    }
+
+    fn meets(&self, other: &Track) -> bool {
+        self.along.dot(&other.along) > 0.0
+            && self.along.cross(&other.along).norm() < SAME
+            && (self.foot - other.foot).norm() < SAME
+            && self.reach[0] <= other.reach[1]
+            && other.reach[0] <= self.reach[1]
+    }
+}
+
+/// A line along the axis of every fit that is pulled apart, from its one surface to its other; for what moves without such a
+/// fit, a line through its middle. `poses` and `shifts` hold one entry per component, as `solids` does.
 pub(super) fn paths(
     solids: &[Arc<Solid>],
     poses: &[Isometry3<f64>],
@@ -29,45 +45,45 @@ pub(super) fn paths(
     liaison: &Liaison,
 ) -> Vec<[Point3<f64>; 2]> {
     let mut tracks: Vec<Track> = Vec::new();
-    for (c, shift) in shifts.iter().enumerate().filter(|(_, s)| s.norm() > STILL) {
-        let along = Unit::new_normalize(*shift);
-        let through = axis(liaison, c, along).unwrap_or_else(|| middle(&solids[c], &poses[c]));
-        let foot = through - along.into_inner() * through.coords.dot(&along);
-        let points = solids[c].mesh.positions.iter().map(|p| (poses[c] * p).coords.dot(&along));
-        let low = points.fold(f64::INFINITY, f64::min);
-        add(&mut tracks, Track { foot, along, reach: [low, low + shift.norm()] });
+    let mut guided = vec![false; shifts.len()];
+    for contact in &liaison.contacts {
+        if let Some(track) = pulled_apart(contact, shifts) {
+            [contact.a, contact.b].iter().for_each(|f| guided[f.component] = true);
+            add(&mut tracks, track);
+        }
+    }
+    for c in (0..shifts.len()).filter(|c| !guided[*c] && shifts[*c].norm() > STILL) {
+        add(&mut tracks, lifted(&solids[c], &poses[c], &shifts[c]));
     }
     let ends = |t: &Track| t.reach.map(|s| t.foot + t.along.into_inner() * s);
     tracks.iter().map(ends).collect()
 }
 
-/// A point on the only axis of the fits that guide a component along a direction.
-fn axis(liaison: &Liaison, component: usize, along: Unit<Vector3<f64>>) -> Option<Point3<f64>> {
-    let guides: Vec<_> = liaison.of(component).filter(|c| c.sideways_span(along).is_some()).collect();
-    let first = guides.first()?;
-    let off = |p: &Point3<f64>| (p - first.point).cross(&along).norm();
-    guides.iter().all(|c| off(&c.point) < SAME).then_some(first.point)
+/// The axis of a fit between components that move apart along it.
+fn pulled_apart(contact: &Contact, shifts: &[Vector3<f64>]) -> Option<Track> {
+    let [a, b] = [contact.a, contact.b].map(|f| shifts[f.component]);
+    let along = Unit::try_new(b - a, STILL)?;
+    let along = if along.dot(&contact.direction) < 0.0 { -along } else { along };
+    let [low, high] = contact.sideways_span(along)?;
+    let (a, b) = (a.dot(&along), b.dot(&along));
+    Some(Track::new(&contact.point, along, [low + a.min(b), high + a.max(b)]))
 }
 
-/// The middle of the box round a placed solid, square to the assembly's axes.
-fn middle(solid: &Solid, pose: &Isometry3<f64>) -> Point3<f64> {
+/// The line through the middle of what is moved, as far as it is moved.
+fn lifted(solid: &Solid, pose: &Isometry3<f64>, shift: &Vector3<f64>) -> Track {
+    let along = Unit::new_normalize(*shift);
     let points = || solid.mesh.positions.iter().map(|p| pose * p);
     let low = points().fold(Point3::from([f64::INFINITY; 3]), |low, p| low.inf(&p));
     let high = points().fold(Point3::from([f64::NEG_INFINITY; 3]), |high, p| high.sup(&p));
-    nalgebra::center(&low, &high)
+    let from = points().map(|p| p.coords.dot(&along)).fold(f64::INFINITY, f64::min);
+    Track::new(&nalgebra::center(&low, &high), along, [from, from + shift.norm()])
 }
 
 /// Adds a track, or lengthens the one on the same line.
-fn add(tracks: &mut Vec<Track>, new: Track) {
-    let same = |t: &&mut Track| {
-        t.along.cross(&new.along).norm() < SAME
-            && t.along.dot(&new.along) > 0.0
-            && (t.foot - new.foot).norm() < SAME
-            && t.reach[0] <= new.reach[1]
-            && new.reach[0] <= t.reach[1]
-    };
-    match tracks.iter_mut().find(same) {
-        Some(track) => track.reach = [track.reach[0].min(new.reach[0]), track.reach[1].max(new.reach[1])],
-        None => tracks.push(new),
+fn add(tracks: &mut Vec<Track>, mut new: Track) {
+    while let Some(at) = tracks.iter().position(|t| t.meets(&new)) {
+        let old = tracks.remove(at);
+        new.reach = [old.reach[0].min(new.reach[0]), old.reach[1].max(new.reach[1])];
     }
+    tracks.push(new);
 }
