@@ -31,6 +31,14 @@ pub fn svg(design: &Design, solids: &[Arc<Solid>], analysis: &Analysis) -> Strin
     draw::draw(&design.name, &graph, &net, &layout)
 }
 
+/// How often wires cross in the diagram: what its layout is judged by.
+pub fn crossings(design: &Design, solids: &[Arc<Solid>], analysis: &Analysis) -> usize {
+    let graph = graph::Graph::new(design, solids, &analysis.liaison);
+    let mut net = order::Net::new(&graph, &layers::layers(&graph, &analysis.insertion));
+    order::sort(&mut net);
+    net.crossings()
+}
+
 /// The diagram for graphviz: a cluster per component, a node per surface, an edge per contact. `solids` as in [`svg`].
 pub fn dot(design: &Design, solids: &[Arc<Solid>], analysis: &Analysis) -> String {
     let liaison = &analysis.liaison;
