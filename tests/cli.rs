@@ -184,18 +184,28 @@ fn the_same_spec_gives_the_same_bytes_at_any_number_of_threads() {
 fn emitted_stages_lie_beside_the_model_that_was_not_asked_for() {
     let folder = Folder::new("emit");
     folder.file("plate.gng", spec());
-    let stages = "design,brep,contacts,liaison,error-trees,object-tree,insertion,view";
+    let stages = "design,brep,contacts,liaison,error-trees,object-tree,insertion,exploded,view";
     folder.run(&["compile", "plate.gng", "--emit", stages, "--deps", "plate.d"]).expect(0, &[]);
     let expected = [
+        "plate.assembled.svg",
         "plate.brep.ron",
         "plate.contacts.ron",
         "plate.d",
         "plate.design.ron",
+        "plate.error_trees",
+        "plate.error_trees.json",
         "plate.error_trees.ron",
+        "plate.exploded.svg",
         "plate.gng",
         "plate.insertion.ron",
+        "plate.liaison.dot",
+        "plate.liaison.json",
         "plate.liaison.ron",
+        "plate.liaison.svg",
+        "plate.object_tree.dot",
+        "plate.object_tree.json",
         "plate.object_tree.ron",
+        "plate.object_tree.svg",
         "plate.view.ron",
     ];
     assert_eq!(folder.names(), expected);
