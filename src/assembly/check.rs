@@ -3,65 +3,63 @@
 //! In: contacts, clashes and bodies that enter each other. Out: E0501 (interference at nominal), W0502 (interference within
 //! tolerance), E0503 (a component that touches nothing). Never moves anything.
 
-use super::contact::{Clash, Contact, FaceRef, Fit};
+use super::boxes::{Bounds, BoxTree, distance_to_triangle};
+use super::contact::{Clash, Contact, FaceRef, Tight};
 use super::liaison::Liaison;
-use super::limits::{Slip, Zones};
 use super::meeting::Entering;
 use super::place::place;
+use super::tight;
 use crate::design::model::Design;
 use crate::diag::Diagnostic;
-use crate::solid::Solid;
-use nalgebra::{Isometry3, Point3, Vector3};
+use crate::solid::{Solid, Surface};
+use nalgebra::{Isometry3, Point3};
 use std::sync::Arc;
 
 /// A deliberate press fit interferes by at most this share of the diameter (ISO 286 u6 on small sizes has 0.5 %).
 const TIGHTEST_PRESS: f64 = 0.005;
-/// Placement may use up this much (mm) more than the clearance before it is worth a warning.
-const NEGLIGIBLE: f64 = 1e-4;
+
+/// What the analysis saw.
+#[derive(Clone, Copy)]
+pub(crate) struct Seen<'a> {
+    pub liaison: &'a Liaison,
+    pub clashes: &'a [Clash],
+    pub entering: &'a [Entering],
+    pub tight: &'a [Tight],
+}
 
 /// All findings, in the design's order.
-pub(crate) fn check(
-    design: &Design,
-    solids: &[Arc<Solid>],
-    liaison: &Liaison,
-    clashes: &[Clash],
-    entering: &[Entering],
-) -> Vec<Diagnostic> {
-    let mut found = interference(design, solids, liaison, clashes, entering);
-    found.extend(tight_zones(design, solids, liaison));
-    found.extend(untouched(design, solids, liaison));
+pub(crate) fn check(design: &Design, solids: &[Arc<Solid>], seen: &Seen) -> Vec<Diagnostic> {
+    let mut found = interference(design, solids, seen);
+    found.extend(tight::warnings(design, solids, seen.liaison, seen.tight));
+    found.extend(untouched(design, solids, seen.liaison));
     found
 }
 
 /// E0501, once per pair of components.
-fn interference(
-    design: &Design,
-    solids: &[Arc<Solid>],
-    liaison: &Liaison,
-    clashes: &[Clash],
-    entering: &[Entering],
-) -> Vec<Diagnostic> {
-    let name = |f: FaceRef| face_name(design, solids, f);
-    let mut found: Vec<(usize, usize, Diagnostic)> = Vec::new();
-    for clash in clashes {
-        let entry = enters(design, clash.a.component, clash.b.component, clash.depth);
-        let note =
-            format!("the axes of `{}` and `{}` are that far apart, clearance deducted", name(clash.a), name(clash.b));
-        found.push((clash.a.component, clash.b.component, entry.note(note)));
-    }
-    for c in liaison.contacts.iter().filter(|c| presses_too_hard(c, solids)) {
-        let entry = enters(design, c.a.component, c.b.component, -c.gap);
-        let note = format!(
-            "`{}` is smaller than `{}`: no press fit is as tight",
-            name(hollow(c, solids)),
-            name(full(c, solids))
-        );
-        found.push((c.a.component, c.b.component, entry.note(note)));
-    }
-    found.extend(entering.iter().map(|e| (e.a, e.b, enters(design, e.a, e.b, e.depth))));
+fn interference(design: &Design, solids: &[Arc<Solid>], seen: &Seen) -> Vec<Diagnostic> {
+    let clashes = seen.clashes.iter().map(|c| (c.a.component, c.b.component, clash(design, solids, c)));
+    let pressed = seen.liaison.contacts.iter().filter(|c| presses_too_hard(c, solids));
+    let pressed = pressed.map(|c| (c.a.component, c.b.component, press(design, solids, c)));
+    let entering = seen.entering.iter().map(|e| (e.a, e.b, enters(design, e.a, e.b, e.depth)));
+    let mut found: Vec<(usize, usize, Diagnostic)> = clashes.chain(pressed).chain(entering).collect();
     found.sort_by_key(|(a, b, _)| (*a, *b));
     found.dedup_by_key(|(a, b, _)| (*a, *b));
     found.into_iter().map(|(.., d)| d).collect()
+}
+
+fn clash(design: &Design, solids: &[Arc<Solid>], clash: &Clash) -> Diagnostic {
+    let [a, b] = [clash.a, clash.b].map(|f| face_name(design, solids, f));
+    enters(design, clash.a.component, clash.b.component, clash.depth)
+        .note(format!("the axes of `{a}` and `{b}` are that far apart, clearance deducted"))
+}
+
+fn press(design: &Design, solids: &[Arc<Solid>], c: &Contact) -> Diagnostic {
+    let (hole, pin) = (hollow(c), full(c));
+    let [hole_name, pin_name] = [hole, pin].map(|f| face_name(design, solids, f));
+    let [hole_d, pin_d] = [hole, pin].map(|f| diameter(solids, f).unwrap_or_default());
+    enters(design, c.a.component, c.b.component, -c.gap)
+        .note(format!("`{hole_name}` is smaller than `{pin_name}`: no press fit is as tight"))
+        .help(format!("`{pin_name}` at most {hole_d:.3} across, or `{hole_name}` at least {pin_d:.3}"))
 }
 
 fn enters(design: &Design, a: usize, b: usize, depth: f64) -> Diagnostic {
@@ -72,104 +70,26 @@ fn enters(design: &Design, a: usize, b: usize, depth: f64) -> Diagnostic {
         .also(first.span, format!("`{}` is placed here", first.name))
 }
 
-fn hollow(c: &Contact, solids: &[Arc<Solid>]) -> FaceRef {
-    if solids[c.a.component].faces[c.a.face].outward { c.b } else { c.a }
+/// The hollow and the full face of a round contact.
+pub(crate) fn hollow(c: &Contact) -> FaceRef {
+    if c.full { c.b } else { c.a }
 }
 
-fn full(c: &Contact, solids: &[Arc<Solid>]) -> FaceRef {
-    if hollow(c, solids) == c.a { c.b } else { c.a }
+pub(crate) fn full(c: &Contact) -> FaceRef {
+    if c.full { c.a } else { c.b }
 }
 
 fn presses_too_hard(c: &Contact, solids: &[Arc<Solid>]) -> bool {
-    use crate::solid::Surface::{Cylinder, Sphere};
-    let f = full(c, solids);
+    c.fit.is_some() && diameter(solids, full(c)).is_some_and(|d| -c.gap > TIGHTEST_PRESS * d)
+}
+
+fn diameter(solids: &[Arc<Solid>], f: FaceRef) -> Option<f64> {
     let solid = &solids[f.component];
-    let (Cylinder { radius, .. } | Sphere { radius, .. }) = &solid.surfaces[solid.faces[f.face].surface] else {
-        return false;
-    };
-    c.fit.is_some() && -c.gap > TIGHTEST_PRESS * 2.0 * radius
-}
-
-/// How far placement outruns the clearance of one contact.
-struct Tight<'a> {
-    contact: &'a Contact,
-    /// Shifts across the axis, the largest first.
-    slips: Vec<Slip>,
-    /// Sum of the shifts (mm).
-    reach: f64,
-}
-
-/// W0502, once per component: for the contact where its zone outruns the clearance most.
-fn tight_zones(design: &Design, solids: &[Arc<Solid>], liaison: &Liaison) -> Vec<Diagnostic> {
-    let zones = Zones::new(design);
-    let mut worst: Vec<(usize, f64, Tight)> = Vec::new();
-    let sized = liaison.contacts.iter().filter(|c| matches!(c.fit, Some(Fit::Clearance | Fit::Transition)));
-    for contact in sized {
-        let tight = Tight::new(contact, &zones);
-        let excess = tight.reach - contact.gap_range[0] / 2.0;
-        let owner = tight.slips.first().map_or(contact.b.component, |s| s.component);
-        if excess > NEGLIGIBLE && worst.iter().all(|(c, e, _)| *c != owner || *e < excess) {
-            worst.retain(|(c, ..)| *c != owner);
-            worst.push((owner, excess, tight));
-        }
+    match &solid.surfaces[solid.faces[f.face].surface] {
+        Surface::Cylinder { radius, .. } | Surface::Sphere { radius, .. } => Some(2.0 * radius),
+        Surface::Torus { minor, .. } => Some(2.0 * minor),
+        _ => None,
     }
-    worst.sort_by_key(|(owner, ..)| *owner);
-    worst.iter().map(|(owner, _, tight)| tight.diagnostic(design, solids, *owner)).collect()
-}
-
-impl<'a> Tight<'a> {
-    fn new(contact: &'a Contact, zones: &Zones) -> Self {
-        let axis = contact.direction.into_inner();
-        let middle =
-            contact.point + axis * ((contact.span[0] + contact.span[1]) / 2.0 - contact.point.coords.dot(&axis));
-        let mut slips = zones.slips(contact.a.component, contact.b.component, &middle);
-        for slip in &mut slips {
-            slip.shift -= axis * slip.shift.dot(&axis);
-        }
-        slips.retain(|s| s.shift.norm() > NEGLIGIBLE / 10.0);
-        slips.sort_by(|p, q| q.shift.norm().total_cmp(&p.shift.norm()));
-        let reach = slips.iter().map(|s| s.shift.norm()).sum();
-        Tight { contact, slips, reach }
-    }
-
-    fn diagnostic(&self, design: &Design, solids: &[Arc<Solid>], owner: usize) -> Diagnostic {
-        let c = self.contact;
-        let component = &design.components[owner];
-        let (hole, pin) = (face_name(design, solids, hollow(c, solids)), face_name(design, solids, full(c, solids)));
-        let message = format!("`{pin}` can meet `{hole}` within tolerance");
-        let label = if self.slips.is_empty() {
-            format!("at MMC they interfere by {:.4} mm", -c.gap_range[0])
-        } else {
-            let left = c.gap_range[0];
-            format!("at MMC {left:.4} mm of clearance is left, but placement allows ±{:.4} mm", self.reach)
-        };
-        let warning = Diagnostic::warning("W0502", component.span, message).label(label);
-        match self.remedy(design) {
-            Some(help) => warning.help(help),
-            None => warning,
-        }
-    }
-
-    /// The widest zone that keeps clear, where one axis alone is to blame.
-    fn remedy(&self, design: &Design) -> Option<String> {
-        let [slip] = self.slips.as_slice() else { return None };
-        let share = self.contact.gap_range[0] / 2.0 / slip.shift.norm();
-        let pose = &design.components[slip.component].pose;
-        let (expr, scale, unit) = match slip.axis {
-            axis @ 0..3 => (&pose.t[axis], 1.0, ""),
-            axis => (&pose.r[axis - 3], 1f64.to_degrees(), " deg"),
-        };
-        let nominal = (expr.eval(&design.nominal()) * scale * 1e6).round() / 1e6 + 0.0;
-        let axis = ["x", "y", "z", "rx", "ry", "rz"][slip.axis];
-        (share > 0.0).then(|| format!("{axis} = {nominal} ±{}{unit}", rounded_down(slip.half_width * share * scale)))
-    }
-}
-
-/// A positive number cut to two significant digits, so that what is pasted is never wider than what was worked out.
-fn rounded_down(value: f64) -> String {
-    let decimals = (1.0 - value.log10().floor()).max(0.0) as usize;
-    let scale = 10f64.powi(decimals as i32);
-    format!("{:.decimals$}", (value * scale + 1e-9).floor() / scale)
 }
 
 /// What is nearer than this (mm, the facets of curved faces) touches after all, if only along a line or in a point.
@@ -177,9 +97,16 @@ const LINE_CONTACT: f64 = 0.02;
 
 /// E0503 for every component but the root that touches nothing.
 fn untouched(design: &Design, solids: &[Arc<Solid>], liaison: &Liaison) -> Vec<Diagnostic> {
+    let lonely: Vec<usize> = (1..liaison.components).filter(|c| liaison.of(*c).next().is_none()).collect();
+    if lonely.is_empty() {
+        return Vec::new();
+    }
     let poses = place(design, &design.nominal());
-    let lonely = (1..liaison.components).filter(|c| liaison.of(*c).next().is_none());
-    let nearest = lonely.map(|c| (c, nearest_face(solids, &poses, c)));
+    let bounds = |(s, pose): (&Arc<Solid>, &Isometry3<f64>)| {
+        Bounds::of(&s.mesh.positions.iter().map(|p| pose * p).collect::<Vec<_>>())
+    };
+    let tree = BoxTree::new(solids.iter().zip(&poses).map(bounds).collect());
+    let nearest = lonely.into_iter().map(|c| (c, nearest_face(solids, &poses, &tree, c)));
     let apart = nearest.filter(|(_, nearest)| nearest.is_none_or(|(_, distance)| distance > LINE_CONTACT));
     apart.map(|(c, nearest)| touches_nothing(design, solids, c, nearest)).collect()
 }
@@ -203,44 +130,41 @@ fn touches_nothing(
 }
 
 /// The face of another component nearest to this one's vertices (mm).
-fn nearest_face(solids: &[Arc<Solid>], poses: &[Isometry3<f64>], component: usize) -> Option<(FaceRef, f64)> {
+fn nearest_face(
+    solids: &[Arc<Solid>],
+    poses: &[Isometry3<f64>],
+    tree: &BoxTree,
+    component: usize,
+) -> Option<(FaceRef, f64)> {
     let own: Vec<Point3<f64>> = solids[component].mesh.positions.iter().map(|p| poses[component] * p).collect();
     let mut best: Option<(FaceRef, f64)> = None;
-    for (other, solid) in solids.iter().enumerate().filter(|(o, _)| *o != component) {
-        let local: Vec<Point3<f64>> = own.iter().map(|p| poses[other].inverse() * p).collect();
-        for (triangle, face) in solid.mesh.triangles.iter().zip(&solid.mesh.faces) {
-            let corners = triangle.map(|i| solid.mesh.positions[i as usize]);
+    tree.nearest(&Bounds::of(&own), f64::INFINITY, &mut |other, _| {
+        if other != component {
             let limit = best.map_or(f64::INFINITY, |b| b.1);
-            let distance = nearest_point(&local, &corners, limit);
-            if distance < limit {
-                best = Some((FaceRef { component: other, face: *face as usize }, distance));
-            }
+            let local: Vec<Point3<f64>> = own.iter().map(|p| poses[other].inverse() * p).collect();
+            let found = nearest_on(&solids[other], &local, limit);
+            best = found.map(|(face, distance)| (FaceRef { component: other, face }, distance)).or(best);
         }
-    }
+        best.map_or(f64::INFINITY, |b| b.1)
+    });
     best
 }
 
-/// The least distance (mm) of some points from a triangle, if below a limit.
-fn nearest_point(points: &[Point3<f64>], corners: &[Point3<f64>; 3], limit: f64) -> f64 {
-    let centre = Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
-    let radius = corners.iter().map(|c| (c - centre).norm()).fold(0.0, f64::max);
-    let close = points.iter().filter(|p| (*p - centre).norm() - radius < limit);
-    close.map(|p| distance_to_triangle(p, corners)).fold(limit, f64::min)
-}
-
-fn distance_to_triangle(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
-    let normal = (b - a).cross(&(c - a));
-    let inside = [(a, b), (b, c), (c, a)].iter().all(|(s, t)| normal.dot(&(*t - *s).cross(&(p - *s))) >= 0.0);
-    if inside && normal.norm() > 0.0 {
-        return (normal.dot(&(p - a)) / normal.norm()).abs();
+/// The face of a solid nearest to some points in its frame, if nearer than a limit (mm).
+fn nearest_on(solid: &Solid, points: &[Point3<f64>], limit: f64) -> Option<(usize, f64)> {
+    let near = Bounds::of(points);
+    let (mut best, mut limit) = (None, limit);
+    for (triangle, face) in solid.mesh.triangles.iter().zip(&solid.mesh.faces) {
+        let corners = triangle.map(|i| solid.mesh.positions[i as usize]);
+        if Bounds::of(&corners).distance(&near) >= limit {
+            continue;
+        }
+        let distance = points.iter().map(|p| distance_to_triangle(p, &corners)).fold(f64::INFINITY, f64::min);
+        if distance < limit {
+            (best, limit) = (Some((*face as usize, distance)), distance);
+        }
     }
-    [(a, b), (b, c), (c, a)].iter().map(|(s, t)| distance_to_segment(p, s, t)).fold(f64::INFINITY, f64::min)
-}
-
-fn distance_to_segment(p: &Point3<f64>, s: &Point3<f64>, t: &Point3<f64>) -> f64 {
-    let along: Vector3<f64> = t - s;
-    let share = if along.norm_squared() > 0.0 { (p - s).dot(&along) / along.norm_squared() } else { 0.0 };
-    (p - (s + along * share.clamp(0.0, 1.0))).norm()
+    best
 }
 
 /// `wheel_a1.hd_hole.side`.
@@ -312,7 +236,7 @@ mod tests {
         let a = sample::pattern_wheel();
         let (_, found) = analyse(&a.design, &a.solids);
         let codes: Vec<_> = found.iter().map(|d| d.code).collect();
-        assert_eq!(codes, ["W0502"; 3]);
+        assert_eq!(codes, ["W0502"; 5]);
         assert_eq!(
             found[0].message,
             "`alignment_pin[1].shank.side` can meet `locking_ring.pin_hole[1].side` within tolerance"

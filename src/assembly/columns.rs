@@ -109,7 +109,7 @@ struct Crossing {
 }
 
 /// Triangles seen edge-on cover less than this (mm²) and cross no column.
-const EDGE_ON: f64 = 1e-10;
+pub(crate) const EDGE_ON: f64 = 1e-10;
 
 /// Mesh vertices in the coordinates of a frame.
 pub(crate) fn project(mesh: &TriMesh, pose: &Isometry3<f64>, frame: &Frame) -> Vec<[f64; 3]> {
@@ -119,10 +119,13 @@ pub(crate) fn project(mesh: &TriMesh, pose: &Isometry3<f64>, frame: &Frame) -> V
 impl Columns {
     /// Rasterises a mesh whose vertices are given in the grid's frame (see [`project`]).
     pub fn new(mesh: &TriMesh, points: &[[f64; 3]], grid: &Grid) -> Self {
+        Self::of(mesh.triangles.iter().map(|t| t.map(|i| points[i as usize])), grid)
+    }
+
+    /// Rasterises those triangles of a watertight mesh that cover any cell of the grid.
+    pub fn of(triangles: impl Iterator<Item = [[f64; 3]; 3]>, grid: &Grid) -> Self {
         let mut crossings = Vec::new();
-        for triangle in &mesh.triangles {
-            cross(triangle.map(|i| points[i as usize]), grid, &mut crossings);
-        }
+        triangles.for_each(|t| cross(t, grid, &mut crossings));
         Self::pair(crossings, grid)
     }
 

@@ -1,16 +1,24 @@
 //! Contacts between placed components at nominal, and their fits over the limits (section III of the paper).
 //!
 //! In: the design and the nominal solids. Out: pairs of faces on matching surfaces with opposed senses whose regions
-//! overlap, each with its area, its gap at nominal, and its gap at [MMC, LMC]. Meshes serve only to lay regions flat;
-//! whether surfaces match, and how they fit, is decided on their parameters.
+//! overlap, each with its area, its gap at nominal, its gap at [MMC, LMC] and its range over all limits and placement zones.
+//! Meshes serve only to lay regions flat; whether surfaces match, and how they fit, is decided on their parameters. Boxes
+//! decide what is compared at all, so the work grows with the number of faces near each other.
 
-use super::limits::{Zones, moved, surface_at};
-use super::overlap::{Chart, Flat, Overlap, overlap};
+use super::body::{Body, PlacedFace, middle, placed};
+use super::boxes::BoxTree;
+use super::matching::{Candidate, Gauge, candidate};
+use super::overlap::{BINS, Chart, Flat, overlap, square_to};
 use super::place::place;
-use crate::design::model::{Design, Values};
+use super::play::{Mating, Share};
+use super::sides::{Joint, Side};
+use super::tangent;
+use crate::design::model::Design;
 use crate::solid::{Solid, Surface};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::Serialize;
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// A face of a placed component: the surface the paper draws as a circle.
@@ -22,12 +30,15 @@ pub struct FaceRef {
     pub face: usize,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum ContactKind {
     Plane,
     Cylinder,
     Cone,
     Sphere,
+    Torus,
+    /// In a line or a point: a shaft on a plate, a ball in a cone.
+    Tangent,
 }
 
 /// What the limits allow between an internal and an external size.
@@ -45,20 +56,31 @@ pub struct Contact {
     pub a: FaceRef,
     pub b: FaceRef,
     pub kind: ContactKind,
-    /// Planes: the normal out of `a` into `b`. Cylinders and cones: the axis.
+    /// Planes and tangents: the normal out of `a` into `b`. Cylinders, cones and tori: the axis.
     pub direction: Unit<Vector3<f64>>,
-    /// A point of the plane within the contact's reach, a point on the axis, the centre of the sphere (mm).
+    /// A point of the plane within the contact's reach, a point on the axis, the centre of the sphere or torus, the apex of
+    /// the cone, where a tangent touches (mm).
     pub point: Point3<f64>,
-    /// Common area (mm²).
+    /// Common area (mm²); 0 for tangents.
     pub area: f64,
     /// From where to where it reaches along `direction`, measured from the assembly's origin (mm).
     pub span: [f64; 2],
-    /// Nominal gap (mm): the distance of planes, the difference in diameter of cylinders and spheres. Cones: 0.
+    /// Nominal gap (mm): the distance of planes, cones (square to the flank) and tangents, the difference in diameter of
+    /// cylinders, spheres and tubes.
     pub gap: f64,
     /// The gap with every dimension at MMC and at LMC.
     pub gap_range: [f64; 2],
-    /// Of cylinders and spheres.
+    /// The least and the largest distance of the faces (mm) over all limits and placement zones, where they come nearest;
+    /// negative where they enter each other. Of round faces half a difference in diameter, less what the axes miss by.
+    pub play: [f64; 2],
+    /// Of cylinders, spheres and tori.
     pub fit: Option<Fit>,
+    /// Which of 32 equal parts of the turn about `direction` the contact covers, one bit each.
+    pub arc: u32,
+    /// Half angle (rad) of cones; 0 of others.
+    pub slope: f64,
+    /// Whether `a` is the full one of two round faces, `b` the hollow one; true of others.
+    pub full: bool,
 }
 
 impl Contact {
@@ -79,20 +101,44 @@ impl Contact {
         let [low, high] = self.span;
         parallel.then(|| if self.direction.dot(&direction) > 0.0 { [low, high] } else { [-high, -low] })
     }
+
+    /// Whether the contact stops a component from moving in a direction: some normal out of it, into the other, points
+    /// that way. Of spheres and tori only what their bodies show is known.
+    pub fn stops(&self, component: usize, direction: Unit<Vector3<f64>>) -> bool {
+        let out = if self.a.component == component { 1.0 } else { -1.0 };
+        match self.kind {
+            ContactKind::Plane | ContactKind::Tangent => out * self.direction.dot(&direction) > ALONG,
+            ContactKind::Cylinder | ContactKind::Cone => self.normals().any(|n| out * n.dot(&direction) > ALONG),
+            ContactKind::Sphere | ContactKind::Torus => false,
+        }
+    }
+
+    /// Normals out of `a` over the arc of a cylinder or cone.
+    fn normals(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        let (u, v) = square_to(self.direction);
+        let full = if self.full { 1.0 } else { -1.0 };
+        let (sin, cos) = self.slope.sin_cos();
+        (0..BINS).filter(|k| self.arc >> k & 1 == 1).map(move |k| {
+            let angle = (k as f64 + 0.5) * TAU / BINS as f64;
+            ((u * angle.cos() + v * angle.sin()) * cos - self.direction.into_inner() * sin) * full
+        })
+    }
 }
 
-/// An axis is along a direction when the sine of their angle is below this.
+/// A direction lies along another, or in a plane, when the sine of their angle is below this.
 const ALONG: f64 = 1e-3;
 /// Faces closer than this touch (mm), whatever the placement zones say.
-const TOUCH: f64 = 1e-3;
-/// Normals and axes are parallel when the sine of their angle is below this.
-const PARALLEL: f64 = 1e-5;
-/// The loosest pair of cylinders still called a fit: near ISO 286 H11/c11 (mm, and mm per mm of diameter).
-const LOOSEST: [f64; 2] = [0.05, 0.02];
+pub(crate) const TOUCH: f64 = 1e-3;
 /// Regions that share less than this (mm²) touch in a line or a point only.
 const LEAST_AREA: f64 = 0.01;
 /// Sizes equal to this (mm) are equal: what is left after arithmetic on limits.
 const ROUNDING: f64 = 1e-9;
+/// Faces farther apart than this (mm) are not compared at all: wider than any placement zone in use.
+const LARGEST_GAP: f64 = 2.0;
+/// Axes of cylinders that miss each other by less than this share of the radius were meant to be one.
+const MOST_ECCENTRIC: f64 = 0.25;
+/// Faces that can enter each other by less than this (mm) over limits and zones do so by rounding.
+pub(crate) const NEGLIGIBLE: f64 = 1e-4;
 
 /// A round face that enters another at nominal, because their axes miss each other by more than the clearance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -103,234 +149,180 @@ pub(crate) struct Clash {
     pub depth: f64,
 }
 
+/// A contact whose faces can enter each other, with what each dimension takes.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Tight {
+    pub a: FaceRef,
+    pub b: FaceRef,
+    pub shares: Vec<Share>,
+}
+
 /// Contacts, and what only just fails to be one.
 #[derive(Debug, Default)]
 pub(crate) struct Found {
     pub contacts: Vec<Contact>,
+    /// Contacts in a line or a point.
+    pub tangents: Vec<Contact>,
     pub clashes: Vec<Clash>,
+    pub tight: Vec<Tight>,
 }
 
-/// All contacts, ordered by components and faces. `solids` holds one solid per component at nominal, in its own frame.
+/// All contacts over an area, ordered by components and faces. `solids` holds one solid per component at nominal, in its
+/// own frame.
 pub fn contacts(design: &Design, solids: &[Arc<Solid>]) -> Vec<Contact> {
     find(design, solids).contacts
 }
 
-/// Contacts and clashes of round faces.
+/// Contacts, and clashes of round faces.
 pub(crate) fn find(design: &Design, solids: &[Arc<Solid>]) -> Found {
-    let zones = Zones::new(design);
-    let limits = [Limit::new(design, design.mmc()), Limit::new(design, design.lmc())];
-    let bodies = placed_bodies(design, solids);
-    let mut found = Found::default();
-    for a in 0..bodies.len() {
-        for b in a + 1..bodies.len() {
-            if bodies[a].bounds.meets(&bodies[b].bounds) {
-                between(design, [a, b], &bodies, &zones, &limits, &mut found);
-            }
+    let mut survey = Survey::new(design, solids);
+    let tree = BoxTree::new(survey.bodies.iter().map(|b| b.bounds).collect());
+    for a in 0..survey.bodies.len() {
+        let near = tree.meeting(&survey.bodies[a].bounds.widened(LARGEST_GAP));
+        for b in near.into_iter().filter(|b| *b > a) {
+            survey.between([a, b]);
         }
     }
-    found
+    survey.found.drop_shared_tangents();
+    survey.found
 }
 
-/// One end of the tolerance zones.
-struct Limit {
-    values: Vec<f64>,
+impl Found {
+    /// Where a face touches a component over an area, that it also touches it along the rim says nothing new.
+    fn drop_shared_tangents(&mut self) {
+        let sides = |c: &Contact| [(c.a, c.b.component), (c.b, c.a.component)];
+        let broad: BTreeSet<(FaceRef, usize)> = self.contacts.iter().flat_map(sides).collect();
+        self.tangents.retain(|t| sides(t).iter().all(|side| !broad.contains(side)));
+    }
+}
+
+/// The search under way.
+struct Survey<'a> {
+    design: &'a Design,
     poses: Vec<Isometry3<f64>>,
+    bodies: Vec<Body>,
+    /// Nominal; put to limits and back while a contact is looked at.
+    values: Vec<f64>,
+    /// MMC and LMC.
+    limits: [Vec<f64>; 2],
+    found: Found,
 }
 
-impl Limit {
-    fn new(design: &Design, values: Vec<f64>) -> Self {
+/// Two faces of two components.
+type Pair<'a> = [(FaceRef, &'a PlacedFace); 2];
+
+impl<'a> Survey<'a> {
+    fn new(design: &'a Design, solids: &[Arc<Solid>]) -> Self {
+        let values = design.nominal();
         let poses = place(design, &values);
-        Limit { values, poses }
-    }
-}
-
-/// A component's faces in the assembly's frame.
-struct Body {
-    solid: Arc<Solid>,
-    faces: Vec<PlacedFace>,
-    bounds: Bounds,
-}
-
-struct PlacedFace {
-    surface: Surface,
-    outward: bool,
-    triangles: Vec<[Point3<f64>; 3]>,
-    bounds: Bounds,
-}
-
-#[derive(Clone, Copy)]
-struct Bounds {
-    low: Vector3<f64>,
-    high: Vector3<f64>,
-}
-
-impl Bounds {
-    fn of<'a>(points: impl Iterator<Item = &'a Point3<f64>>) -> Self {
-        let empty = Bounds { low: Vector3::repeat(f64::INFINITY), high: Vector3::repeat(f64::NEG_INFINITY) };
-        points.fold(empty, |b, p| Bounds { low: b.low.inf(&p.coords), high: b.high.sup(&p.coords) })
+        let bodies = placed(solids, &poses);
+        Survey { design, bodies, poses, values, limits: [design.mmc(), design.lmc()], found: Found::default() }
     }
 
-    /// Whether two boxes come within the largest gap that can still be a contact.
-    fn meets(&self, other: &Bounds) -> bool {
-        let reach = LARGEST_GAP;
-        (0..3).all(|i| self.low[i] <= other.high[i] + reach && other.low[i] <= self.high[i] + reach)
-    }
-}
-
-/// Faces farther apart than this (mm) are not compared at all: wider than any placement zone in use.
-const LARGEST_GAP: f64 = 2.0;
-
-fn placed_bodies(design: &Design, solids: &[Arc<Solid>]) -> Vec<Body> {
-    place(design, &design.nominal()).iter().zip(solids).map(|(pose, solid)| placed_body(solid, pose)).collect()
-}
-
-fn placed_body(solid: &Arc<Solid>, pose: &Isometry3<f64>) -> Body {
-    let points: Vec<Point3<f64>> = solid.mesh.positions.iter().map(|p| pose * p).collect();
-    let mut triangles = vec![Vec::new(); solid.faces.len()];
-    for (corners, face) in solid.mesh.triangles.iter().zip(&solid.mesh.faces) {
-        triangles[*face as usize].push(corners.map(|i| points[i as usize]));
-    }
-    let place_face = |(face, triangles): (&crate::solid::Face, Vec<[Point3<f64>; 3]>)| PlacedFace {
-        surface: moved(&solid.surfaces[face.surface], pose),
-        outward: face.outward,
-        bounds: Bounds::of(triangles.iter().flatten()),
-        triangles,
-    };
-    let faces = solid.faces.iter().zip(triangles).map(place_face).collect();
-    Body { solid: solid.clone(), faces, bounds: Bounds::of(points.iter()) }
-}
-
-fn between(design: &Design, pair: [usize; 2], bodies: &[Body], zones: &Zones, limits: &[Limit; 2], out: &mut Found) {
-    let [a, b] = pair.map(|i| &bodies[i]);
-    for (i, f) in a.faces.iter().enumerate().filter(|(_, f)| f.bounds.meets(&b.bounds)) {
-        for (j, g) in b.faces.iter().enumerate() {
-            if !f.bounds.meets(&g.bounds) {
-                continue;
-            }
-            let Some(candidate) = candidate(f, g) else { continue };
-            let faces = [FaceRef { component: pair[0], face: i }, FaceRef { component: pair[1], face: j }];
-            match touch(faces, f, g, &candidate, zones) {
-                Some(Touch::Contact(mut contact)) => {
-                    contact.gap_range = gap_range(design, bodies, &contact, limits);
-                    contact.fit = candidate.sized.then(|| classify(contact.gap_range));
-                    out.contacts.push(contact);
-                }
-                Some(Touch::Clash(clash)) => out.clashes.push(clash),
-                None => {}
+    fn between(&mut self, pair: [usize; 2]) {
+        let bodies = std::mem::take(&mut self.bodies);
+        let joint = Joint::new(self.design, pair, &self.poses);
+        let [a, b] = pair.map(|c| &bodies[c]);
+        let near = |face: &(usize, &PlacedFace), other: &Body| face.1.bounds.widened(LARGEST_GAP).meets(&other.bounds);
+        let theirs: Vec<(usize, &PlacedFace)> = b.faces.iter().enumerate().filter(|g| near(g, a)).collect();
+        for f in a.faces.iter().enumerate().filter(|f| near(f, b)) {
+            let reach = f.1.bounds.widened(LARGEST_GAP);
+            for g in theirs.iter().filter(|g| g.1.bounds.meets(&reach)) {
+                let face = |k: usize, (face, placed)| (FaceRef { component: pair[k], face }, placed);
+                self.meet([face(0, f), face(1, *g)], [a, b], &joint);
             }
         }
+        self.bodies = bodies;
     }
-}
 
-/// Two surfaces of one kind with opposed senses, and how they lie to each other.
-struct Candidate {
-    kind: ContactKind,
-    direction: Unit<Vector3<f64>>,
-    point: Point3<f64>,
-    gap: f64,
-    /// By how much their axes, apexes or centres miss each other (mm).
-    offset: Vector3<f64>,
-    /// Whether the gap is a difference of diameters.
-    sized: bool,
-}
-
-fn candidate(f: &PlacedFace, g: &PlacedFace) -> Option<Candidate> {
-    match (&f.surface, &g.surface) {
-        (Surface::Plane { normal: n, offset: p }, Surface::Plane { normal: m, offset: q }) => {
-            planes(if f.outward { (*n, *p) } else { (-*n, -p) }, if g.outward { (*m, *q) } else { (-*m, -q) })
+    /// What two faces do to each other, if they are close enough and their regions overlap.
+    fn meet(&mut self, pair: Pair, bodies: [&Body; 2], joint: &Joint) {
+        let Some(candidate) = candidate(pair[0].1, pair[1].1) else {
+            let touch = tangent::tangent([pair[0].1, pair[1].1], bodies, pair.map(|(f, _)| f.face));
+            self.found.tangents.extend(touch.map(|t| t.contact(pair.map(|(f, _)| f))));
+            return;
+        };
+        let [(a, f), (b, g)] = pair;
+        let near = self.is_near(&candidate, &middle(&f.bounds, &g.bounds), joint);
+        let eccentric =
+            candidate.kind == ContactKind::Cylinder && candidate.miss() < MOST_ECCENTRIC * radius(&f.surface);
+        if !near && !eccentric {
+            return;
         }
-        (Surface::Cylinder { point, axis, radius }, Surface::Cylinder { point: q, axis: m, radius: s }) => {
-            let gap = clearance(f, g, *radius, *s)?;
-            let offset = q - point - axis.into_inner() * (q - point).dot(axis);
-            parallel(axis, m).then_some(Candidate { gap, offset, ..round(ContactKind::Cylinder, *axis, *point, true) })
+        let Some(common) = Common::of(pair, bodies, &candidate) else { return };
+        if near {
+            self.contact(pair, bodies, &candidate, &common, joint);
+        } else {
+            self.found.clashes.push(Clash { a, b, depth: candidate.miss() });
         }
-        (Surface::Cone { apex, axis, half_angle }, Surface::Cone { apex: q, axis: m, half_angle: t }) => {
-            let same = parallel(axis, m) && axis.dot(m) > 0.0 && (half_angle - t).abs() < PARALLEL;
-            let opposed = f.outward != g.outward;
-            (same && opposed).then_some(Candidate { offset: q - apex, ..round(ContactKind::Cone, *axis, *apex, false) })
-        }
-        (Surface::Sphere { centre, radius, .. }, Surface::Sphere { centre: q, radius: s, .. }) => {
-            let gap = clearance(f, g, *radius, *s)?;
-            let shape = round(ContactKind::Sphere, Vector3::z_axis(), *centre, true);
-            Some(Candidate { gap, offset: q - centre, ..shape })
-        }
-        _ => None,
     }
-}
 
-fn round(kind: ContactKind, direction: Unit<Vector3<f64>>, point: Point3<f64>, sized: bool) -> Candidate {
-    Candidate { kind, direction, point, gap: 0.0, offset: Vector3::zeros(), sized }
-}
-
-/// Planes given by their outward normals and offsets.
-fn planes((n, p): (Unit<Vector3<f64>>, f64), (m, q): (Unit<Vector3<f64>>, f64)) -> Option<Candidate> {
-    let opposed = parallel(&n, &m) && n.dot(&m) < 0.0;
-    let point = Point3::from(n.scale(p));
-    opposed.then_some(Candidate { gap: -q - p, ..round(ContactKind::Plane, n, point, false) })
-}
-
-fn parallel(a: &Vector3<f64>, b: &Vector3<f64>) -> bool {
-    a.cross(b).norm() < PARALLEL
-}
-
-/// Diameter of the hollow face less that of the full one, when there is one of each and they are of a size to fit.
-fn clearance(f: &PlacedFace, g: &PlacedFace, r: f64, s: f64) -> Option<f64> {
-    let gap = match (f.outward, g.outward) {
-        (true, false) => 2.0 * (s - r),
-        (false, true) => 2.0 * (r - s),
-        _ => return None,
-    };
-    (gap.abs() <= LOOSEST[0] + LOOSEST[1] * 2.0 * r.min(s)).then_some(gap)
-}
-
-enum Touch {
-    Contact(Contact),
-    Clash(Clash),
-}
-
-/// What two candidate faces do to each other, if they are close enough and their regions overlap.
-fn touch(faces: [FaceRef; 2], f: &PlacedFace, g: &PlacedFace, c: &Candidate, zones: &Zones) -> Option<Touch> {
-    let at = Point3::from((f.bounds.low.sup(&g.bounds.low) + f.bounds.high.inf(&g.bounds.high)) / 2.0);
-    let near = c.miss() <= TOUCH + slack(faces, c, zones, &at);
-    let eccentric = c.kind == ContactKind::Cylinder && c.miss() < MOST_ECCENTRIC * radius(&f.surface);
-    if !near && !eccentric {
-        return None;
+    /// Whether the surfaces coincide, as nearly as the placement zones at that point can make up for.
+    fn is_near(&mut self, c: &Candidate, at: &Point3<f64>, joint: &Joint) -> bool {
+        let counts = |shift: &Vector3<f64>| match c.kind {
+            ContactKind::Plane => shift.dot(&c.direction).abs(),
+            ContactKind::Cylinder => (shift - c.direction.into_inner() * shift.dot(&c.direction)).norm(),
+            _ => shift.norm(),
+        };
+        let mut slack = || joint.shifts(&mut self.values, at).iter().map(counts).sum::<f64>();
+        c.miss() <= TOUCH || c.miss() <= TOUCH + slack()
     }
-    let chart = Chart::new(&f.surface);
-    let lay = |face: &PlacedFace| -> Vec<Flat> { face.triangles.iter().map(|t| chart.lay(*t)).collect() };
-    let common = overlap(&lay(f), &lay(g), chart.is_round()).filter(|o| o.area >= LEAST_AREA)?;
-    let [a, b] = faces;
-    if !near {
-        return Some(Touch::Clash(Clash { a, b, depth: c.miss() }));
+
+    fn contact(&mut self, pair: Pair, bodies: [&Body; 2], c: &Candidate, common: &Common, joint: &Joint) {
+        let [(a, f), (b, g)] = pair;
+        let at = middle(&f.bounds, &g.bounds);
+        let on_plane = at - c.direction.into_inner() * (at - c.point).dot(&c.direction);
+        let mut contact = Contact {
+            a,
+            b,
+            kind: c.kind,
+            direction: c.direction,
+            point: if c.kind == ContactKind::Plane { on_plane } else { c.point },
+            area: common.area,
+            span: common.span,
+            gap: c.gap,
+            gap_range: [c.gap; 2],
+            play: [c.gap; 2],
+            fit: None,
+            arc: common.arc,
+            slope: slope(&f.surface),
+            full: c.kind == ContactKind::Plane || f.outward,
+        };
+        let sign = if contact.full { 1.0 } else { -1.0 };
+        let gauge = Gauge { kind: c.kind, direction: c.direction, probes: common.probes(&contact), sign };
+        let tight = self.measure(&mut contact, [(a, bodies[0]), (b, bodies[1])], &gauge, joint, [f, g]);
+        self.found.tight.extend(tight);
+        self.found.contacts.push(contact);
     }
-    let span = span(&chart, c, &common);
-    let on_plane = at - c.direction.into_inner() * (at - c.point).dot(&c.direction);
-    let point = if c.kind == ContactKind::Plane { on_plane } else { c.point };
-    let Candidate { kind, direction, gap, .. } = *c;
-    Some(Touch::Contact(Contact {
-        a,
-        b,
-        kind,
-        direction,
-        point,
-        area: common.area,
-        span,
-        gap,
-        gap_range: [gap; 2],
-        fit: None,
-    }))
-}
 
-/// Axes of cylinders that miss each other by less than this share of the radius were meant to be one.
-const MOST_ECCENTRIC: f64 = 0.25;
-
-impl Candidate {
-    /// By how much the surfaces miss each other, beyond what their clearance allows (mm).
-    fn miss(&self) -> f64 {
-        match self.kind {
-            ContactKind::Plane => self.gap.abs(),
-            _ => self.offset.norm() - self.gap.abs() / 2.0,
-        }
+    /// Gaps, fit and play, from the expressions of the two faces; nominal ones where a face has none of its own.
+    fn measure(
+        &mut self,
+        contact: &mut Contact,
+        faces: [(FaceRef, &Body); 2],
+        gauge: &Gauge,
+        joint: &Joint,
+        placed: [&PlacedFace; 2],
+    ) -> Option<Tight> {
+        let nominal = gauge.drawn(&gauge.lies(&placed[0].surface, &placed[1].surface));
+        contact.gap = nominal.filter(|_| contact.kind != ContactKind::Plane).unwrap_or(contact.gap);
+        contact.gap_range = [contact.gap; 2];
+        let side = |(f, body): (FaceRef, &Body)| {
+            let part = &self.design.parts[self.design.components[f.component].part];
+            Side::new(part, &body.solid.faces[f.face].name, &self.values)
+        };
+        let [Some(s), Some(t)] = faces.map(side) else {
+            contact.fit = classify(contact);
+            return None;
+        };
+        let mating = Mating { design: self.design, joint, sides: &[s, t], gauge };
+        let at = |limit: &Vec<f64>| gauge.drawn(&mating.lies(limit)).unwrap_or(contact.gap);
+        contact.gap_range = self.limits.each_ref().map(at);
+        contact.fit = classify(contact);
+        let play = mating.play(&mut self.values)?;
+        contact.play = play.range;
+        let enters = play.range[0] < -NEGLIGIBLE && contact.fit != Some(Fit::Interference);
+        enters.then_some(Tight { a: contact.a, b: contact.b, shares: play.shares })
     }
 }
 
@@ -341,53 +333,72 @@ fn radius(surface: &Surface) -> f64 {
     }
 }
 
-/// How much of a miss the placement zones can make up for at a point (mm).
-fn slack(faces: [FaceRef; 2], c: &Candidate, zones: &Zones, at: &Point3<f64>) -> f64 {
-    let slips = zones.slips(faces[0].component, faces[1].component, at);
-    let counts = |shift: &Vector3<f64>| match c.kind {
-        ContactKind::Plane => shift.dot(&c.direction).abs(),
-        ContactKind::Cylinder => (shift - c.direction.into_inner() * shift.dot(&c.direction)).norm(),
-        _ => shift.norm(),
-    };
-    slips.iter().map(|s| counts(&s.shift)).sum()
+fn slope(surface: &Surface) -> f64 {
+    if let Surface::Cone { half_angle, .. } = surface { *half_angle } else { 0.0 }
 }
 
-fn span(chart: &Chart, c: &Candidate, common: &Overlap) -> [f64; 2] {
-    let base = chart.origin().coords.dot(&c.direction);
-    common.reach.map(|h| base + chart.along_axis(h))
+/// The region two faces share.
+struct Common {
+    area: f64,
+    /// Along the candidate's direction, from the assembly's origin (mm).
+    span: [f64; 2],
+    arc: u32,
+    /// Of planes: points round the region.
+    outline: Vec<Point3<f64>>,
 }
 
-/// The gap at MMC and LMC, from the expressions of the two faces; the nominal gap where a face has none of its own.
-fn gap_range(design: &Design, bodies: &[Body], contact: &Contact, limits: &[Limit; 2]) -> [f64; 2] {
-    limits.each_ref().map(|limit| {
-        let surface = |f: FaceRef| surface_of(design, &bodies[f.component], f, &limit.values);
-        let (Some(s), Some(t)) = (surface(contact.a), surface(contact.b)) else { return contact.gap };
-        let place = |surface: &Surface, f: FaceRef| moved(surface, &limit.poses[f.component]);
-        gap(contact, &place(&s, contact.a), &place(&t, contact.b), bodies)
-    })
-}
-
-fn surface_of(design: &Design, body: &Body, f: FaceRef, values: &Values) -> Option<Surface> {
-    let part = &design.parts[design.components[f.component].part];
-    surface_at(part, &body.solid.faces[f.face].name, values)
-}
-
-fn gap(contact: &Contact, s: &Surface, t: &Surface, bodies: &[Body]) -> f64 {
-    let sign = if bodies[contact.a.component].faces[contact.a.face].outward { 1.0 } else { -1.0 };
-    match (s, t) {
-        (Surface::Plane { normal: n, offset: p }, Surface::Plane { normal: m, offset: q }) => {
-            let along =
-                |n: &Vector3<f64>, offset: f64| (offset - n.dot(&contact.point.coords)) / n.dot(&contact.direction);
-            along(m, *q) - along(n, *p)
+impl Common {
+    fn of([(a, f), (b, g)]: Pair, bodies: [&Body; 2], c: &Candidate) -> Option<Common> {
+        if let (Some(own), Some(other)) = (f.ring, g.ring) {
+            return Common::of_rings(f, own, g, other, c);
         }
-        (Surface::Cylinder { radius: r, .. }, Surface::Cylinder { radius: s, .. })
-        | (Surface::Sphere { radius: r, .. }, Surface::Sphere { radius: s, .. }) => sign * 2.0 * (s - r),
-        _ => contact.gap,
+        let near = f.bounds.widened(LARGEST_GAP).common(&g.bounds.widened(LARGEST_GAP));
+        let chart = Chart::new(&f.surface);
+        let lay = |body: &Body, face: FaceRef| -> Vec<Flat> {
+            body.triangles(face.face, &near).into_iter().map(|t| chart.lay(t)).collect()
+        };
+        let common = overlap(&lay(bodies[0], a), &lay(bodies[1], b), chart.periods())?;
+        let base = chart.origin().coords.dot(&c.direction);
+        let outline = match c.kind {
+            ContactKind::Plane => common.outline.map(|p| chart.on_plane(p)).to_vec(),
+            _ => Vec::new(),
+        };
+        let span = common.reach.map(|h| base + chart.along_axis(h));
+        (common.area >= LEAST_AREA).then_some(Common { area: common.area, span, arc: common.arc, outline })
+    }
+
+    /// Cylinders whole all the way round share a stretch of the axis.
+    fn of_rings(f: &PlacedFace, own: [f64; 2], g: &PlacedFace, other: [f64; 2], c: &Candidate) -> Option<Common> {
+        let span = |face: &PlacedFace, [low, high]: [f64; 2]| {
+            let base = face.surface.origin().coords.dot(&c.direction);
+            if face.surface.axis().dot(&c.direction) > 0.0 { [base + low, base + high] } else { [base - high, base - low] }
+        };
+        let (p, q) = (span(f, own), span(g, other));
+        let span = [p[0].max(q[0]), p[1].min(q[1])];
+        let area = TAU * radius(&f.surface) * (span[1] - span[0]);
+        (area >= LEAST_AREA).then_some(Common { area, span, arc: u32::MAX, outline: Vec::new() })
+    }
+
+    /// Where a contact is gauged.
+    fn probes(&self, contact: &Contact) -> Vec<Point3<f64>> {
+        let d = contact.direction.into_inner();
+        match contact.kind {
+            ContactKind::Plane => self.outline.clone(),
+            ContactKind::Cylinder | ContactKind::Cone => {
+                self.span.map(|h| contact.point + d * (h - contact.point.coords.dot(&d))).to_vec()
+            }
+            _ => vec![contact.point],
+        }
     }
 }
 
-/// The fit from the gaps at MMC and LMC.
-fn classify([mmc, lmc]: [f64; 2]) -> Fit {
+/// The fit from the gaps at MMC and LMC, of faces with sizes.
+fn classify(contact: &Contact) -> Option<Fit> {
+    let sized = matches!(contact.kind, ContactKind::Cylinder | ContactKind::Sphere | ContactKind::Torus);
+    sized.then(|| fit(contact.gap_range))
+}
+
+fn fit([mmc, lmc]: [f64; 2]) -> Fit {
     if mmc.min(lmc) >= -ROUNDING {
         Fit::Clearance
     } else if mmc.max(lmc) <= ROUNDING {
@@ -404,9 +415,9 @@ mod tests {
 
     #[test]
     fn limits_decide_the_fit() {
-        assert_eq!(classify([0.004, 0.024]), Fit::Clearance);
-        assert_eq!(classify([-0.004, 0.012]), Fit::Transition);
-        assert_eq!(classify([-0.02, -0.004]), Fit::Interference);
+        assert_eq!(fit([0.004, 0.024]), Fit::Clearance);
+        assert_eq!(fit([-0.004, 0.012]), Fit::Transition);
+        assert_eq!(fit([-0.02, -0.004]), Fit::Interference);
     }
 
     #[test]

@@ -8,7 +8,8 @@ use super::contact::FaceRef;
 use super::liaison::Liaison;
 use crate::design::model::Design;
 use serde::Serialize;
-use std::collections::VecDeque;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, VecDeque};
 
 /// What an error in one component can do to the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -42,19 +43,21 @@ pub struct Edge {
 /// The error tree of a component, down to `depth` levels below it (`None`: all that can be reached).
 pub fn error_tree(liaison: &Liaison, root: usize, depth: Option<u32>) -> ErrorTree {
     let mut nodes = vec![TreeNode { component: root, parent: None, level: 0, surfaces: liaison.surfaces(root) }];
+    let mut place = BTreeMap::from([(root, 0)]);
     let mut queue = VecDeque::from([0]);
     while let Some(at) = queue.pop_front() {
         if depth.is_some_and(|d| nodes[at].level >= d) {
             continue;
         }
         for neighbour in liaison.neighbours(nodes[at].component) {
-            if nodes.iter().all(|n| n.component != neighbour) {
+            if let Entry::Vacant(vacant) = place.entry(neighbour) {
+                vacant.insert(nodes.len());
                 queue.push_back(nodes.len());
                 nodes.push(child(liaison, &nodes, at, neighbour));
             }
         }
     }
-    let dashed = dashed(liaison, &nodes);
+    let dashed = dashed(liaison, &nodes, &place);
     ErrorTree { nodes, dashed }
 }
 
@@ -66,11 +69,15 @@ fn child(liaison: &Liaison, nodes: &[TreeNode], parent: usize, component: usize)
     TreeNode { component, parent: Some(parent), level: nodes[parent].level + 1, surfaces }
 }
 
-fn dashed(liaison: &Liaison, nodes: &[TreeNode]) -> Vec<Edge> {
-    let touch = |i: usize, j: usize| liaison.between(nodes[i].component, nodes[j].component).next().is_some();
-    let in_tree = |i: usize, j: usize| nodes[j].parent == Some(i);
-    let pairs = (0..nodes.len()).flat_map(|i| (i + 1..nodes.len()).map(move |j| (i, j)));
-    pairs.filter(|(i, j)| touch(*i, *j) && !in_tree(*i, *j)).map(|(i, j)| Edge { nodes: [i, j] }).collect()
+/// `place` is where each component stands among the nodes.
+fn dashed(liaison: &Liaison, nodes: &[TreeNode], place: &BTreeMap<usize, usize>) -> Vec<Edge> {
+    let later = |i: usize| {
+        let others = liaison.neighbours(nodes[i].component);
+        let mut later: Vec<usize> = others.iter().filter_map(|c| place.get(c).copied()).filter(|j| *j > i).collect();
+        later.sort_unstable();
+        later.into_iter().filter(move |j| nodes[*j].parent != Some(i)).map(move |j| Edge { nodes: [i, j] })
+    };
+    (0..nodes.len()).flat_map(later).collect()
 }
 
 /// The error trees of all watched components under one root, the assembly as a whole.
@@ -98,15 +105,18 @@ pub struct TreeSummary {
 
 /// An error tree with names in place of indices.
 pub fn summary(design: &Design, tree: &ErrorTree) -> TreeSummary {
-    summarise(design, tree, 0)
+    let mut children = vec![Vec::new(); tree.nodes.len()];
+    for (index, node) in tree.nodes.iter().enumerate() {
+        node.parent.into_iter().for_each(|p| children[p].push(index));
+    }
+    summarise(design, tree, &children, 0)
 }
 
-fn summarise(design: &Design, tree: &ErrorTree, node: usize) -> TreeSummary {
+fn summarise(design: &Design, tree: &ErrorTree, children: &[Vec<usize>], node: usize) -> TreeSummary {
     let name = |n: usize| design.components[tree.nodes[n].component].name.clone();
-    let children = (0..tree.nodes.len()).filter(|n| tree.nodes[*n].parent == Some(node));
     TreeSummary {
         component: name(node),
-        spreads_to: children.map(|n| summarise(design, tree, n)).collect(),
+        spreads_to: children[node].iter().map(|n| summarise(design, tree, children, *n)).collect(),
         also_touches: tree.dashed.iter().filter(|e| e.nodes[0] == node).map(|e| name(e.nodes[1])).collect(),
     }
 }

@@ -16,24 +16,44 @@ use std::sync::Arc;
 pub struct Liaison {
     /// Number of components in the design.
     pub components: usize,
-    /// Ordered by (a, b).
+    /// Ordered by (a, b). Contacts over an area; of components that have none, those in a line or a point.
     pub contacts: Vec<Contact>,
+    /// All other contacts in a line or a point, ordered alike.
+    pub tangents: Vec<Contact>,
+    /// Per component the indices of its contacts, ascending.
+    touching: Vec<Vec<usize>>,
 }
 
 impl Liaison {
-    pub fn new(components: usize, mut contacts: Vec<Contact>) -> Self {
-        contacts.sort_by_key(|c| (c.a.component, c.b.component, c.a.face, c.b.face));
-        Liaison { components, contacts }
+    pub fn new(components: usize, contacts: Vec<Contact>) -> Self {
+        Self::with_tangents(components, contacts, Vec::new())
+    }
+
+    /// Contacts in a line or a point count as contacts of components that touch nothing over an area.
+    pub fn with_tangents(components: usize, mut contacts: Vec<Contact>, tangents: Vec<Contact>) -> Self {
+        let mut broad = vec![false; components];
+        contacts.iter().for_each(|c| [c.a, c.b].iter().for_each(|f| broad[f.component] = true));
+        let only = |c: &Contact| !broad[c.a.component] || !broad[c.b.component];
+        let (own, mut tangents): (Vec<Contact>, Vec<Contact>) = tangents.into_iter().partition(only);
+        contacts.extend(own);
+        contacts.sort_by_key(order);
+        tangents.sort_by_key(order);
+        let mut touching = vec![Vec::new(); components];
+        for (index, contact) in contacts.iter().enumerate() {
+            [contact.a, contact.b].iter().for_each(|f| touching[f.component].push(index));
+        }
+        Liaison { components, contacts, tangents, touching }
     }
 
     /// Contacts of one component.
     pub fn of(&self, component: usize) -> impl Iterator<Item = &Contact> {
-        self.contacts.iter().filter(move |c| c.on(component).is_some())
+        self.touching[component].iter().map(|index| &self.contacts[*index])
     }
 
     /// Contacts between two components, in either order.
     pub fn between(&self, a: usize, b: usize) -> impl Iterator<Item = &Contact> {
-        self.of(a).filter(move |c| c.on(b).is_some())
+        let (few, many) = if self.touching[a].len() <= self.touching[b].len() { (a, b) } else { (b, a) };
+        self.of(few).filter(move |c| c.on(many).is_some())
     }
 
     /// Components that touch this one, in the design's order.
@@ -52,11 +72,17 @@ impl Liaison {
     pub fn rests(&self, component: usize, direction: Unit<Vector3<f64>>) -> bool {
         self.of(component).any(|c| match c.kind {
             ContactKind::Cylinder => false,
-            ContactKind::Plane if c.a.component == component => c.direction.dot(&direction) < -FACING,
-            ContactKind::Plane => c.direction.dot(&direction) > FACING,
-            ContactKind::Cone | ContactKind::Sphere => true,
+            ContactKind::Plane | ContactKind::Tangent => {
+                let out = if c.a.component == component { 1.0 } else { -1.0 };
+                out * c.direction.dot(&direction) < -FACING
+            }
+            ContactKind::Cone | ContactKind::Sphere | ContactKind::Torus => true,
         })
     }
+}
+
+fn order(c: &Contact) -> (usize, usize, usize, usize) {
+    (c.a.component, c.b.component, c.a.face, c.b.face)
 }
 
 /// A plane bears along a direction when the cosine between them exceeds this.
@@ -67,6 +93,9 @@ const FACING: f64 = 1e-3;
 pub struct LiaisonSummary {
     pub components: Vec<String>,
     pub liaisons: Vec<PairSummary>,
+    /// Pairs that also touch in a line or a point.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tangents: Vec<PairSummary>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -91,17 +120,25 @@ pub struct ContactSummary {
 
 /// The liaison diagram with names in place of indices.
 pub fn summary(design: &Design, solids: &[Arc<Solid>], liaison: &Liaison) -> LiaisonSummary {
+    LiaisonSummary {
+        components: design.components.iter().map(|c| c.name.clone()).collect(),
+        liaisons: pairs(design, solids, &liaison.contacts),
+        tangents: pairs(design, solids, &liaison.tangents),
+    }
+}
+
+fn pairs(design: &Design, solids: &[Arc<Solid>], contacts: &[Contact]) -> Vec<PairSummary> {
     let name = |component: usize| design.components[component].name.clone();
-    let mut liaisons: Vec<PairSummary> = Vec::new();
-    for contact in &liaison.contacts {
+    let mut pairs: Vec<PairSummary> = Vec::new();
+    for contact in contacts {
         let (a, b) = (name(contact.a.component), name(contact.b.component));
         let entry = contact_summary(solids, contact);
-        match liaisons.last_mut().filter(|p| p.a == a && p.b == b) {
+        match pairs.last_mut().filter(|p| p.a == a && p.b == b) {
             Some(pair) => pair.contacts.push(entry),
-            None => liaisons.push(PairSummary { a, b, contacts: vec![entry] }),
+            None => pairs.push(PairSummary { a, b, contacts: vec![entry] }),
         }
     }
-    LiaisonSummary { components: (0..liaison.components).map(name).collect(), liaisons }
+    pairs
 }
 
 fn contact_summary(solids: &[Arc<Solid>], contact: &Contact) -> ContactSummary {

@@ -1,13 +1,18 @@
 //! Which bodies stand in each other's way along a direction, and which enter each other.
 //!
-//! In: placed solids and a direction. Out: for every pair of bodies whether one is in the other's way over the whole path,
-//! and how deep they enter each other. Read from columns of material, so features narrower than about three cells (a
-//! twentieth of what two bodies share) are not seen; contacts have to supply those. Says nothing of fits.
+//! In: placed solids and a direction. Out: for every body those in its way over the whole path, and how deep bodies enter
+//! each other. Read from columns of material over what two bodies share; what is too thin for the columns is looked for
+//! among the triangles one by one. Bodies whose shadows lie apart are never compared, and pairs that stand to each other
+//! as another pair does are worked out once. Says nothing of fits.
 
-use super::columns::{Columns, Extent, Frame, Grid, erode, project};
-use crate::solid::{Solid, TriMesh};
+use super::boxes::BoxTree;
+use super::columns::{Columns, Extent, Frame, Grid, erode};
+use super::overlap::clipped;
+use super::silhouette::{Seen, Shade, doubled, shades};
+use crate::solid::Solid;
 use nalgebra::{Isometry3, Unit, Vector3};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Bodies that enter each other less than this (mm) along the direction do not block.
@@ -15,11 +20,16 @@ const DEPTH_TOLERANCE: f64 = 0.02;
 /// Cells across the region two bodies share, and the least side of a cell (mm).
 const CELLS_ACROSS: f64 = 64.0;
 const FINEST_CELL: f64 = 0.05;
+/// What two triangles share may be the sagging of facets up to this width (mm).
+const SAG: f64 = 0.04;
+/// Places that differ by less than this (mm) are one.
+const SAME_PLACE: f64 = 1e-9;
 
 /// How the bodies meet along one direction.
+#[derive(Debug, Default)]
 pub(crate) struct Meetings {
-    /// `way[a][b]`: b stands in the way of a.
-    pub way: Vec<Vec<bool>>,
+    /// Per body those in its way, ascending.
+    pub way: Vec<Vec<usize>>,
     pub entering: Vec<Entering>,
 }
 
@@ -33,32 +43,45 @@ pub(crate) struct Entering {
 }
 
 impl Meetings {
-    pub fn new<'a>(direction: Unit<Vector3<f64>>, solids: &'a [Arc<Solid>], poses: &[Isometry3<f64>]) -> Self {
-        let frame = Frame::along(direction);
-        let body = |(solid, pose): (&'a Arc<Solid>, &Isometry3<f64>)| {
-            let points = project(&solid.mesh, pose, &frame);
-            Body { mesh: &solid.mesh, extent: Extent::of(&points), points }
-        };
-        let bodies: Vec<Body> = solids.iter().zip(poses).map(body).collect();
-        let n = bodies.len();
-        let pairs: Vec<[usize; 2]> = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b])).collect();
-        let met: Vec<Option<Meeting>> = pairs.par_iter().map(|pair| meeting(pair.map(|i| &bodies[i]))).collect();
-        let mut meetings = Meetings { way: vec![vec![false; n]; n], entering: Vec::new() };
-        for ([a, b], meeting) in pairs.into_iter().zip(met) {
-            let Some(meeting) = meeting else { continue };
-            meetings.way[a][b] = meeting.second_above;
-            meetings.way[b][a] = meeting.first_above;
-            meetings.entering.extend(meeting.depth.map(|depth| Entering { a, b, depth }));
+    pub fn new(direction: Unit<Vector3<f64>>, solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Self {
+        let shades = shades(&Frame::along(direction), solids, poses);
+        let tree = BoxTree::new(shades.iter().map(Shade::bounds).collect());
+        let mut pairs: Vec<([usize; 2], usize)> = Vec::new();
+        let (mut jobs, mut known) = (Vec::new(), BTreeMap::new());
+        for a in 0..shades.len() {
+            for b in tree.meeting(&shades[a].bounds()).into_iter().filter(|b| *b > a) {
+                let job = *known.entry(key(&shades[a], &shades[b])).or_insert_with(|| {
+                    jobs.push([a, b]);
+                    jobs.len() - 1
+                });
+                pairs.push(([a, b], job));
+            }
         }
+        let met: Vec<Option<Meeting>> = jobs.par_iter().map(|pair| meeting(pair.map(|i| &shades[i]))).collect();
+        let mut meetings = Meetings { way: vec![Vec::new(); shades.len()], entering: Vec::new() };
+        for ([a, b], job) in pairs {
+            if let Some(meeting) = &met[job] {
+                meetings.note(a, b, meeting);
+            }
+        }
+        meetings.way.iter_mut().for_each(|w| w.sort_unstable());
         meetings
+    }
+
+    fn note(&mut self, a: usize, b: usize, meeting: &Meeting) {
+        if meeting.second_above {
+            self.way[a].push(b);
+        }
+        if meeting.first_above {
+            self.way[b].push(a);
+        }
+        self.entering.extend(meeting.depth.map(|depth| Entering { a, b, depth }));
     }
 }
 
-/// A body in the coordinates of the direction.
-struct Body<'a> {
-    mesh: &'a TriMesh,
-    points: Vec<[f64; 3]>,
-    extent: Extent,
+/// What a pair's meeting depends on: the two silhouettes and how the second stands to the first.
+fn key(a: &Shade, b: &Shade) -> (usize, usize, [i64; 3]) {
+    (a.number, b.number, [0, 1, 2].map(|i| ((b.shift[i] - a.shift[i]) / SAME_PLACE).round() as i64))
 }
 
 /// How two bodies meet along the direction.
@@ -71,20 +94,62 @@ struct Meeting {
 }
 
 /// `None` for bodies that pass each other by.
-fn meeting(bodies: [&Body; 2]) -> Option<Meeting> {
-    let region = bodies[0].extent.common(&bodies[1].extent);
+fn meeting(bodies: [&Shade; 2]) -> Option<Meeting> {
+    let [first, second] = bodies.map(Shade::extent);
+    let region = first.common(&second);
     let size = [0, 1].map(|i| region.high[i] - region.low[i]);
-    if size[0] <= 0.0 || size[1] <= 0.0 {
+    let apart = size[0] <= 0.0 || size[1] <= 0.0;
+    // Overlap narrower than a cell never fills the three cells that count.
+    let clear = |p: usize| bodies[p].is_clear_of(bodies[1 - p], FINEST_CELL);
+    if apart || clear(0) || clear(1) {
         return None;
     }
     let cell = (size[0].max(size[1]) / CELLS_ACROSS).max(FINEST_CELL);
     let grid = Grid::over(&region, cell);
-    let [p, q] = bodies.map(|b| Columns::new(b.mesh, &b.points, &grid));
+    let [p, q] = bodies.map(|b| Columns::of(b.over(&region), &grid));
+    let higher = |low: &Extent, high: &Extent| high.high[2] > low.low[2] + DEPTH_TOLERANCE;
+    let is_above = |below: usize, p: &Columns, q: &Columns, possible: bool| {
+        possible && (any_wide(&grid, |c| above(p, q, c)) || thinly_above(bodies[below], bodies[1 - below], &region))
+    };
     Some(Meeting {
-        second_above: any_wide(&grid, |c| above(&p, &q, c)),
-        first_above: any_wide(&grid, |c| above(&q, &p, c)),
+        second_above: is_above(0, &p, &q, higher(&first, &second)),
+        first_above: is_above(1, &q, &p, higher(&second, &first)),
         depth: if region.high[2] - region.low[2] > DEPTH_TOLERANCE { depth(&p, &q, &grid) } else { None },
     })
+}
+
+/// Whether some triangle of the second body's upper side lies above one of the first's underside, over more than facets sag.
+fn thinly_above(first: &Shade, second: &Shade, region: &Extent) -> bool {
+    first.over(region).filter(|s| doubled(s) < 0.0).any(|s| {
+        let lowest = s.iter().map(|p| p[2]).fold(f64::INFINITY, f64::min);
+        let above = |t: &Seen| doubled(t) > 0.0 && t.iter().any(|p| p[2] > lowest + DEPTH_TOLERANCE);
+        second.over(&Extent::of(&s)).filter(above).any(|t| shared_and_above(&s, &t))
+    })
+}
+
+fn shared_and_above(s: &Seen, t: &Seen) -> bool {
+    let flat = |t: &Seen| t.map(|p| [p[0], p[1]]);
+    let (common, area) = clipped(&flat(s), &flat(t));
+    let perimeter: f64 = (0..common.len())
+        .map(|i| {
+            let (p, q) = (common[i], common[(i + 1) % common.len()]);
+            (p[0] - q[0]).hypot(p[1] - q[1])
+        })
+        .sum();
+    if 2.0 * area <= SAG * perimeter {
+        return false;
+    }
+    let count = common.len() as f64;
+    let middle = [0, 1].map(|i| common.iter().map(|p| p[i]).sum::<f64>() / count);
+    height(t, middle) > height(s, middle) + DEPTH_TOLERANCE
+}
+
+/// The height of a triangle's plane over a point.
+fn height(t: &Seen, [u, v]: [f64; 2]) -> f64 {
+    let (p, q) = ([0, 1, 2].map(|i| t[1][i] - t[0][i]), [0, 1, 2].map(|i| t[2][i] - t[0][i]));
+    let area = doubled(t);
+    let slope = [(p[2] * q[1] - p[1] * q[2]) / area, (p[0] * q[2] - p[2] * q[0]) / area];
+    t[0][2] + slope[0] * (u - t[0][0]) + slope[1] * (v - t[0][1])
 }
 
 /// Whether q has material above where p begins.

@@ -11,12 +11,21 @@ pub mod liaison;
 pub mod place;
 pub mod turn;
 
+mod blocking;
+mod body;
+mod boxes;
 mod check;
 mod columns;
-mod limits;
+mod explode;
+mod matching;
 mod meeting;
 mod overlap;
+mod play;
 mod rest;
+mod sides;
+mod silhouette;
+mod tangent;
+mod tight;
 #[cfg(test)]
 pub(crate) mod sample;
 
@@ -36,8 +45,9 @@ pub struct Analysis {
 /// `solids` holds one solid per component at nominal, in its part's frame.
 pub fn analyse(design: &Design, solids: &[Arc<Solid>]) -> (Analysis, Vec<Diagnostic>) {
     let found = contact::find(design, solids);
-    let liaison = liaison::Liaison::new(design.components.len(), found.contacts);
+    let liaison = liaison::Liaison::with_tangents(design.components.len(), found.contacts, found.tangents);
     let (insertion, entering) = insertion::take_apart(design, solids, &liaison);
-    let diagnostics = check::check(design, solids, &liaison, &found.clashes, &entering);
+    let seen = check::Seen { liaison: &liaison, clashes: &found.clashes, entering: &entering, tight: &found.tight };
+    let diagnostics = check::check(design, solids, &seen);
     (Analysis { liaison, insertion }, diagnostics)
 }

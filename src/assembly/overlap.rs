@@ -19,6 +19,18 @@ pub(crate) struct Overlap {
     pub area: f64,
     /// Lowest and highest second coordinate of the common region.
     pub reach: [f64; 2],
+    /// Which of the [`BINS`] equal parts of a turn the first coordinate covers, one bit each.
+    pub arc: u32,
+    /// The outermost points of the common region in [`ways`].
+    pub outline: [[f64; 2]; 8],
+}
+
+/// Parts of a turn that a contact's arc is told in.
+pub(crate) const BINS: usize = 32;
+
+/// Eight directions in a plane, evenly round.
+fn ways() -> [[f64; 2]; 8] {
+    std::array::from_fn(|k| [(k as f64 * TAU / 8.0).cos(), (k as f64 * TAU / 8.0).sin()])
 }
 
 /// A surface's parameter plane.
@@ -72,6 +84,20 @@ impl<'a> Chart<'a> {
         self.origin
     }
 
+    /// The point of a plane at these coordinates.
+    pub fn on_plane(&self, [x, y]: [f64; 2]) -> Point3<f64> {
+        self.origin + self.u * x + self.v * y
+    }
+
+    /// After how much the coordinates start again: nothing for an endless axis.
+    pub fn periods(&self) -> [Option<f64>; 2] {
+        let tube = match self.surface {
+            Surface::Torus { major, minor, .. } if major > minor => Some(TAU * major * minor),
+            _ => None,
+        };
+        [self.is_round().then_some(TAU), tube]
+    }
+
     fn coordinates(&self, p: &Point3<f64>) -> [f64; 2] {
         let r = p - self.origin;
         let (x, y, z) = (r.dot(&self.u), r.dot(&self.v), r.dot(&self.w));
@@ -98,6 +124,10 @@ impl<'a> Chart<'a> {
         for k in 0..3 {
             flat[k][0] = if poles[k] { mean } else { flat[k][0] } + shift;
         }
+        if let [_, Some(period)] = self.periods() {
+            let reference = flat[0][1];
+            flat.iter_mut().for_each(|c| c[1] -= period * ((c[1] - reference) / period).round());
+        }
     }
 }
 
@@ -115,20 +145,22 @@ pub(crate) fn square_to(w: Unit<Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
     (u, w.cross(&u))
 }
 
-/// The common region of two faces laid flat in the same chart; `None` where they do not meet.
-pub(crate) fn overlap(a: &[Flat], b: &[Flat], round: bool) -> Option<Overlap> {
-    let turns: &[f64] = if round { &[-TAU, 0.0, TAU] } else { &[0.0] };
-    let mut total = Overlap { area: 0.0, reach: [f64::INFINITY, f64::NEG_INFINITY] };
+/// The common region of two faces laid flat in the same chart, whose coordinates start again after these periods; `None`
+/// where they do not meet.
+pub(crate) fn overlap(a: &[Flat], b: &[Flat], periods: [Option<f64>; 2]) -> Option<Overlap> {
+    let turns = periods.map(|p| p.map_or(vec![0.0], |p| vec![-p, 0.0, p]));
+    let mut total = Overlap::NONE;
     let mut sorted: Vec<(f64, f64, &Flat)> = b.iter().map(|t| (low(t, 0), high(t, 0), t)).collect();
     sorted.sort_by(|p, q| p.0.total_cmp(&q.0));
     let widest = sorted.iter().map(|(l, h, _)| h - l).fold(0.0, f64::max);
-    for turn in turns {
-        for s in a {
-            let shifted = s.map(|[x, y]| [x + turn, y]);
+    let ways = ways();
+    for (turn, s) in turns[0].iter().flat_map(|turn| a.iter().map(move |s| (turn, s))) {
+        for rise in &turns[1] {
+            let shifted = s.map(|[x, y]| [x + turn, y + rise]);
             let from = sorted.partition_point(|(l, ..)| *l < low(&shifted, 0) - widest);
             let to = sorted.partition_point(|(l, ..)| *l < high(&shifted, 0));
             for (.., t) in &sorted[from..to.max(from)] {
-                total.add(&shifted, t);
+                total.add(&shifted, t, &ways);
             }
         }
     }
@@ -136,7 +168,10 @@ pub(crate) fn overlap(a: &[Flat], b: &[Flat], round: bool) -> Option<Overlap> {
 }
 
 impl Overlap {
-    fn add(&mut self, s: &Flat, t: &Flat) {
+    const NONE: Overlap =
+        Overlap { area: 0.0, reach: [f64::INFINITY, f64::NEG_INFINITY], arc: 0, outline: [[f64::NAN; 2]; 8] };
+
+    fn add(&mut self, s: &Flat, t: &Flat, ways: &[[f64; 2]; 8]) {
         if low(s, 1) >= high(t, 1) || low(t, 1) >= high(s, 1) || low(s, 0) >= high(t, 0) {
             return;
         }
@@ -144,11 +179,35 @@ impl Overlap {
         let area = area(&common);
         if area > 0.0 {
             self.area += area;
-            for p in &common {
-                self.reach = [self.reach[0].min(p[1]), self.reach[1].max(p[1])];
-            }
+            self.reach_to(&common, ways);
         }
     }
+
+    fn reach_to(&mut self, polygon: &[[f64; 2]], ways: &[[f64; 2]; 8]) {
+        let along = |p: &[f64; 2], way: &[f64; 2]| p[0] * way[0] + p[1] * way[1];
+        let mut turn = [f64::INFINITY, f64::NEG_INFINITY];
+        for p in polygon {
+            self.reach = [self.reach[0].min(p[1]), self.reach[1].max(p[1])];
+            turn = [turn[0].min(p[0]), turn[1].max(p[0])];
+            for (outermost, way) in self.outline.iter_mut().zip(ways) {
+                let nearer = along(p, way) <= along(outermost, way);
+                if !nearer {
+                    *outermost = *p;
+                }
+            }
+        }
+        self.arc |= bins(turn);
+    }
+}
+
+/// The bins that an interval of angles (rad) covers by their middles.
+fn bins([low, high]: [f64; 2]) -> u32 {
+    let width = TAU / BINS as f64;
+    let (first, last) = ((low / width - 0.5).ceil(), (high / width - 0.5).floor());
+    if last - first >= BINS as f64 {
+        return u32::MAX;
+    }
+    (first as i64..=last as i64).fold(0, |set, k| set | 1 << k.rem_euclid(BINS as i64))
 }
 
 fn low(t: &Flat, axis: usize) -> f64 {
@@ -186,6 +245,13 @@ fn clip(subject: &Flat, window: &Flat) -> Vec<[f64; 2]> {
     polygon
 }
 
+/// What two triangles share, and its area.
+pub(crate) fn clipped(subject: &Flat, window: &Flat) -> (Vec<[f64; 2]>, f64) {
+    let common = clip(subject, window);
+    let size = area(&common);
+    (common, size)
+}
+
 fn area(polygon: &[[f64; 2]]) -> f64 {
     let twice: f64 = (0..polygon.len())
         .map(|i| {
@@ -207,15 +273,15 @@ mod tests {
 
     #[test]
     fn two_squares_share_a_rectangle() {
-        let o = overlap(&square(0.0, 0.0, 2.0), &square(1.0, 0.5, 4.0), false).expect("they overlap");
+        let o = overlap(&square(0.0, 0.0, 2.0), &square(1.0, 0.5, 4.0), [None; 2]).expect("they overlap");
         assert!((o.area - 1.5).abs() < 1e-12);
         assert_eq!(o.reach, [0.5, 2.0]);
-        assert_eq!(overlap(&square(0.0, 0.0, 1.0), &square(1.0, 0.0, 1.0), false), None);
+        assert_eq!(overlap(&square(0.0, 0.0, 1.0), &square(1.0, 0.0, 1.0), [None; 2]), None);
     }
 
     #[test]
     fn an_angle_past_a_whole_turn_is_the_same_angle() {
-        let o = overlap(&square(-0.5, 0.0, 1.0), &square(TAU - 0.25, 0.0, 1.0), true).expect("they overlap");
+        let o = overlap(&square(-0.5, 0.0, 1.0), &square(TAU - 0.25, 0.0, 1.0), [Some(TAU), None]).expect("they overlap");
         assert!((o.area - 0.75).abs() < 1e-12, "{o:?}");
     }
 

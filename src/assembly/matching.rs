@@ -1,0 +1,168 @@
+//! Which surfaces can touch over an area, and how two that match lie to each other.
+//!
+//! In: two faces' surfaces and senses. Out: the kind of contact, and for any draw the gap between the surfaces and by how
+//! much their axes or centres miss each other. Decided on the parameters of the surfaces alone.
+
+use super::body::PlacedFace;
+use super::contact::ContactKind;
+use crate::solid::Surface;
+use nalgebra::{Point3, Unit, Vector3};
+
+/// Normals and axes are parallel when the sine of their angle is below this.
+pub(crate) const PARALLEL: f64 = 1e-5;
+/// The loosest pair of round faces still called a fit: near ISO 286 H11/c11 (mm, and mm per mm of diameter).
+const LOOSEST: [f64; 2] = [0.05, 0.02];
+
+/// Two surfaces of one kind with opposed senses, and how they lie to each other.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub kind: ContactKind,
+    pub direction: Unit<Vector3<f64>>,
+    pub point: Point3<f64>,
+    /// Distance of planes; difference of diameters; 0 for cones.
+    pub gap: f64,
+    /// By how much their axes, apexes or centres miss each other (mm).
+    pub offset: Vector3<f64>,
+}
+
+impl Candidate {
+    /// By how much the surfaces miss each other, beyond what their clearance allows (mm).
+    pub fn miss(&self) -> f64 {
+        match self.kind {
+            ContactKind::Plane => self.gap.abs(),
+            _ => self.offset.norm() - self.gap.abs() / 2.0,
+        }
+    }
+}
+
+/// How two faces match; `None` where they cannot touch over an area.
+pub(crate) fn candidate(f: &PlacedFace, g: &PlacedFace) -> Option<Candidate> {
+    let round = |kind, direction, point| Candidate { kind, direction, point, gap: 0.0, offset: Vector3::zeros() };
+    match (&f.surface, &g.surface) {
+        (Surface::Plane { normal: n, offset: p }, Surface::Plane { normal: m, offset: q }) => {
+            planes(if f.outward { (*n, *p) } else { (-*n, -p) }, if g.outward { (*m, *q) } else { (-*m, -q) })
+        }
+        (Surface::Cylinder { point, axis, radius }, Surface::Cylinder { point: q, axis: m, radius: s }) => {
+            let gap = clearance(f, g, *radius, *s)?;
+            let offset = q - point - axis.into_inner() * (q - point).dot(axis);
+            parallel(axis, m).then(|| Candidate { gap, offset, ..round(ContactKind::Cylinder, *axis, *point) })
+        }
+        (Surface::Cone { apex, axis, half_angle }, Surface::Cone { apex: q, axis: m, half_angle: t }) => {
+            let same = parallel(axis, m) && axis.dot(m) > 0.0 && (half_angle - t).abs() < PARALLEL;
+            let opposed = f.outward != g.outward;
+            (same && opposed).then(|| Candidate { offset: q - apex, ..round(ContactKind::Cone, *axis, *apex) })
+        }
+        (Surface::Sphere { centre, radius, .. }, Surface::Sphere { centre: q, radius: s, .. }) => {
+            let gap = clearance(f, g, *radius, *s)?;
+            Some(Candidate { gap, offset: q - centre, ..round(ContactKind::Sphere, Vector3::z_axis(), *centre) })
+        }
+        (
+            Surface::Torus { centre, axis, major, minor },
+            Surface::Torus { centre: q, axis: m, major: other, minor: s },
+        ) => {
+            let gap = clearance(f, g, *minor, *s)?;
+            let same = parallel(axis, m) && (major - other).abs() <= gap.abs() / 2.0 + ALIKE;
+            same.then(|| Candidate { gap, offset: q - centre, ..round(ContactKind::Torus, *axis, *centre) })
+        }
+        _ => None,
+    }
+}
+
+/// Tubes whose circles differ by less than this (mm) in radius, clearance deducted, are on one circle.
+const ALIKE: f64 = 1e-3;
+
+/// Planes given by their outward normals and offsets.
+fn planes((n, p): (Unit<Vector3<f64>>, f64), (m, q): (Unit<Vector3<f64>>, f64)) -> Option<Candidate> {
+    let opposed = parallel(&n, &m) && n.dot(&m) < 0.0;
+    let (point, offset) = (Point3::from(n.scale(p)), Vector3::zeros());
+    opposed.then_some(Candidate { kind: ContactKind::Plane, direction: n, point, gap: -q - p, offset })
+}
+
+pub(crate) fn parallel(a: &Vector3<f64>, b: &Vector3<f64>) -> bool {
+    a.cross(b).norm() < PARALLEL
+}
+
+/// Diameter of the hollow face less that of the full one, when there is one of each and they are of a size to fit.
+fn clearance(f: &PlacedFace, g: &PlacedFace, r: f64, s: f64) -> Option<f64> {
+    let gap = match (f.outward, g.outward) {
+        (true, false) => 2.0 * (s - r),
+        (false, true) => 2.0 * (r - s),
+        _ => return None,
+    };
+    (gap.abs() <= LOOSEST[0] + LOOSEST[1] * 2.0 * r.min(s)).then_some(gap)
+}
+
+/// How two surfaces of a contact lie to each other at one place and one draw.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lie {
+    /// Between the surfaces if their axes met, square to them (mm).
+    pub gap: f64,
+    /// By how much the axes or centres miss each other, as it counts square to the surfaces (mm).
+    pub offset: Vector3<f64>,
+}
+
+impl Lie {
+    /// The distance of the surfaces where they come nearest (mm); negative where they enter each other.
+    pub fn margin(&self) -> f64 {
+        self.gap - self.offset.norm()
+    }
+}
+
+/// Where and in what sense two surfaces of a contact are compared.
+#[derive(Debug, Clone)]
+pub(crate) struct Gauge {
+    pub kind: ContactKind,
+    pub direction: Unit<Vector3<f64>>,
+    /// Planes: points round the common region. Others: the ends of the common stretch of the axis, or the centre.
+    pub probes: Vec<Point3<f64>>,
+    /// +1 when the first face is the full one (or out of whose plane `direction` points), -1 when the second is.
+    pub sign: f64,
+}
+
+impl Gauge {
+    /// One lie per probe; nothing where the surfaces are no longer of the contact's kind.
+    pub fn lies(&self, s: &Surface, t: &Surface) -> Vec<Lie> {
+        self.probes.iter().filter_map(|p| self.lie(p, s, t)).collect()
+    }
+
+    fn lie(&self, p: &Point3<f64>, s: &Surface, t: &Surface) -> Option<Lie> {
+        let d = self.direction.into_inner();
+        match (s, t) {
+            (Surface::Plane { normal: n, offset: f }, Surface::Plane { normal: m, offset: g }) => {
+                let along = |n: &Vector3<f64>, offset: f64| (offset - n.dot(&p.coords)) / n.dot(&d);
+                Some(Lie { gap: along(m, *g) - along(n, *f), offset: Vector3::zeros() })
+            }
+            (Surface::Cylinder { point, axis, radius }, Surface::Cylinder { point: q, axis: m, radius: r }) => {
+                let offset = pierce(q, m, p, &d) - pierce(point, axis, p, &d);
+                Some(Lie { gap: self.sign * (r - radius), offset })
+            }
+            (Surface::Cone { apex, axis, half_angle }, Surface::Cone { apex: q, axis: m, half_angle: t }) => {
+                let wide = |apex: &Point3<f64>, axis: &Vector3<f64>, angle: f64| (p - apex).dot(axis) * angle.tan();
+                let gap = self.sign * (wide(q, m, *t) - wide(apex, axis, *half_angle)) * half_angle.cos();
+                let offset = (pierce(q, m, p, &d) - pierce(apex, axis, p, &d)) * half_angle.cos();
+                Some(Lie { gap, offset })
+            }
+            (Surface::Sphere { centre, radius, .. }, Surface::Sphere { centre: q, radius: r, .. }) => {
+                Some(Lie { gap: self.sign * (r - radius), offset: q - centre })
+            }
+            (Surface::Torus { centre, major, minor, .. }, Surface::Torus { centre: q, major: wide, minor: r, .. }) => {
+                Some(Lie { gap: self.sign * (r - minor) - (wide - major).abs(), offset: q - centre })
+            }
+            _ => None,
+        }
+    }
+
+    /// The gap as a drawing gives it: between planes and cones square to them, otherwise as a difference of diameters.
+    pub fn drawn(&self, lies: &[Lie]) -> Option<f64> {
+        let least = lies.iter().map(|l| l.gap).reduce(f64::min)?;
+        Some(match self.kind {
+            ContactKind::Cylinder | ContactKind::Sphere | ContactKind::Torus => 2.0 * least,
+            _ => least,
+        })
+    }
+}
+
+/// Where an axis passes through the plane square to `d` at `p`.
+fn pierce(point: &Point3<f64>, axis: &Vector3<f64>, p: &Point3<f64>, d: &Vector3<f64>) -> Point3<f64> {
+    point + axis * ((p - point).dot(d) / axis.dot(d))
+}

@@ -1,0 +1,167 @@
+//! Interference within tolerance, with the dimension that would cure it (W0502).
+//!
+//! In: contacts whose faces can enter each other and what each dimension takes at the worst. Out: one warning per component
+//! and kind, for the contact where most is missing. What is offered as a cure is worked out, never guessed: a limit that
+//! alone leaves no interference, cut so that pasting it is safe.
+
+use super::check::{face_name, full, hollow};
+use super::contact::{Contact, ContactKind, Tight};
+use super::liaison::Liaison;
+use super::play::Share;
+use crate::design::model::{Design, DimId, Expr};
+use crate::diag::Diagnostic;
+use crate::solid::Solid;
+use crate::units::Quantity;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Planes that can enter each other by less than this (mm) are not worth a warning.
+const FLUSH: f64 = 1e-3;
+/// Shortfalls that differ by less than this (mm) are equal: the first is told.
+const SAME: f64 = 1e-9;
+/// Contributors named in a note.
+const NAMED: usize = 4;
+
+/// W0502, in the order of the components whose placement is most to blame.
+pub(crate) fn warnings(
+    design: &Design,
+    solids: &[Arc<Solid>],
+    liaison: &Liaison,
+    tight: &[Tight],
+) -> Vec<Diagnostic> {
+    let axes = axes(design);
+    let mut worst: BTreeMap<Told, (usize, Case)> = BTreeMap::new();
+    for tight in tight {
+        let Some(contact) = liaison.between(tight.a.component, tight.b.component).find(|c| c.a == tight.a && c.b == tight.b)
+        else {
+            continue;
+        };
+        let flat = contact.kind == ContactKind::Plane;
+        let case = Case { contact, shares: &tight.shares, axes: &axes, missing: -contact.play[0] };
+        if flat && case.missing < FLUSH {
+            continue;
+        }
+        let owner = case.owner();
+        // Pieces of one part that rest alike are told of once.
+        let key = if flat { Told::Flat(&design.parts[design.components[owner].part].name) } else { Told::Round(owner) };
+        if worst.get(&key).is_none_or(|(_, known)| known.missing < case.missing - SAME) {
+            worst.insert(key, (owner, case));
+        }
+    }
+    let mut worst: Vec<(usize, bool, Case)> =
+        worst.into_iter().map(|(told, (owner, case))| (owner, matches!(told, Told::Flat(_)), case)).collect();
+    worst.sort_by_key(|(owner, flat, _)| (*flat, *owner));
+    worst.iter().map(|(owner, flat, case)| case.diagnostic(design, solids, *owner, *flat)).collect()
+}
+
+/// What one warning is for.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Told<'a> {
+    Round(usize),
+    /// A part by name.
+    Flat(&'a str),
+}
+
+/// The axis of a component's placement (0..3 along, 3..6 about) that each dimension is.
+type Axes = BTreeMap<DimId, (usize, usize)>;
+
+fn axes(design: &Design) -> Axes {
+    let mut axes = Axes::new();
+    for (component, c) in design.components.iter().enumerate() {
+        for (axis, expr) in c.pose.t.iter().chain(&c.pose.r).enumerate() {
+            if let Expr::Dim(dim) = expr {
+                axes.entry(*dim).or_insert((component, axis));
+            }
+        }
+    }
+    axes
+}
+
+/// A contact whose faces can enter each other.
+struct Case<'a> {
+    contact: &'a Contact,
+    shares: &'a [Share],
+    axes: &'a Axes,
+    /// By how much they can (mm).
+    missing: f64,
+}
+
+impl Case<'_> {
+    /// The component whose placement takes most; the later one if no placement does.
+    fn owner(&self) -> usize {
+        let placed = self.shares.iter().find_map(|s| self.axes.get(&s.dim));
+        placed.map_or(self.contact.b.component, |(component, _)| *component)
+    }
+
+    fn diagnostic(&self, design: &Design, solids: &[Arc<Solid>], owner: usize, flat: bool) -> Diagnostic {
+        let span = design.components[owner].span;
+        let warning = if flat {
+            let [a, b] = [self.contact.a, self.contact.b].map(|f| face_name(design, solids, f));
+            let message = format!("`{b}` can enter `{a}` by {:.4} mm within tolerance", self.missing);
+            let [low, high] = self.contact.play;
+            Diagnostic::warning("W0502", span, message)
+                .label(format!("limits and zones leave {low:.4} to {high:.4} mm between them"))
+        } else {
+            let (hole, pin) = (face_name(design, solids, hollow(self.contact)), face_name(design, solids, full(self.contact)));
+            Diagnostic::warning("W0502", span, format!("`{pin}` can meet `{hole}` within tolerance")).label(self.room())
+        };
+        let warning = match self.contributors(design) {
+            Some(note) => warning.note(note),
+            None => warning,
+        };
+        match self.cure(design) {
+            Some(help) => warning.help(help),
+            None => warning,
+        }
+    }
+
+    /// What clearance there is and what placement takes of it.
+    fn room(&self) -> String {
+        let left = self.contact.gap_range[0];
+        let reach: f64 = self.shares.iter().filter(|s| s.sideways).map(|s| s.loss).sum();
+        if reach <= SAME {
+            format!("at MMC they interfere by {:.4} mm", -left)
+        } else if left < 0.0 {
+            format!("at MMC they interfere by {:.4} mm, and placement allows ±{reach:.4} mm", -left)
+        } else {
+            format!("at MMC {left:.4} mm of clearance is left, but placement allows ±{reach:.4} mm")
+        }
+    }
+
+    /// Who takes most, if there are several.
+    fn contributors(&self, design: &Design) -> Option<String> {
+        let name = |s: &Share| format!("`{}` takes {:.4} mm", design.dims[s.dim.0 as usize].name, s.loss);
+        let named: Vec<String> = self.shares.iter().filter(|s| s.loss > FLUSH / 10.0).take(NAMED).map(name).collect();
+        (named.len() > 1).then(|| named.join(", "))
+    }
+
+    /// The limit that alone leaves no interference: of a placement if one will do, else of a size.
+    fn cure(&self, design: &Design) -> Option<String> {
+        let alone = |s: &&Share| s.loss > self.missing + SAME;
+        let placed = self.shares.iter().filter(alone).find(|s| self.axes.contains_key(&s.dim));
+        let share = placed.or_else(|| self.shares.iter().find(alone))?;
+        let kept = 1.0 - self.missing / share.loss;
+        let dim = &design.dims[share.dim.0 as usize];
+        let (scale, unit) = if dim.quantity == Quantity::Angle { (1f64.to_degrees(), " deg") } else { (1.0, "") };
+        let room = (share.at - dim.range.nominal) * kept * scale;
+        let nominal = (dim.range.nominal * scale * 1e6).round() / 1e6 + 0.0;
+        if let Some((_, axis)) = self.axes.get(&share.dim) {
+            let axis = ["x", "y", "z", "rx", "ry", "rz"][*axis];
+            return Some(format!("{axis} = {nominal} ±{}{unit}", rounded_down(room.abs())));
+        }
+        let limit = nominal + rounded_down(room.abs()).parse::<f64>().unwrap_or(0.0) * room.signum();
+        let limit = (limit * 1e6).round() / 1e6;
+        let word = if room > 0.0 { "at most" } else { "at least" };
+        Some(format!("`{}` {word} {limit}{unit}", dim.name))
+    }
+}
+
+/// A positive number cut to two significant digits, so that what is pasted is never wider than what was worked out.
+fn rounded_down(value: f64) -> String {
+    let decimals = (1.0 - value.max(f64::MIN_POSITIVE).log10().floor()).clamp(0.0, MOST_DECIMALS) as usize;
+    let scale = 10f64.powi(decimals as i32);
+    format!("{:.decimals$}", (value * scale + 1e-9).floor() / scale)
+}
+
+/// Finer than a nanometre nothing is said.
+const MOST_DECIMALS: f64 = 6.0;
