@@ -89,7 +89,7 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     line.enter(Stage::Assembly)?;
     let analysis = line.check(assembly::analyse(&design, &solids))?;
     let trees = assembly::error_tree::object_tree(&design, &analysis.liaison).trees;
-    let modes = assembly::fault::modes(&design, &analysis.liaison, &analysis.insertion, &solids);
+    let modes = || assembly::fault::modes(&design, &analysis.liaison, &analysis.insertion, &solids);
     line.emit_assembly(&design, &solids, &analysis, &trees);
 
     line.enter(Stage::View)?;
@@ -97,9 +97,10 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     let choice = view::choose::choose(&design, station, &bodies, &view::choose::targets(&trees));
     let camera = line.check((choice.camera, choice.diagnostics.clone()))?;
     line.emit(Artifact::View, || artifacts::view(&design, station, &choice));
-    line.emit_files(Artifact::Images, || artifacts::images::pictures(&design, station, &camera, &modes));
+    line.emit_files(Artifact::Images, || artifacts::images::pictures(&design, station, &camera, &modes()));
 
     line.enter(Stage::Plan)?;
+    let modes = modes();
     let (spec, datum) = (line::digest(&design), line::datum(&design, &analysis.liaison, &modes));
     let tree = &assembly::error_tree::error_tree(&analysis.liaison, 0, None);
     let job = train::Job { design: &design, station, camera, modes: &modes, tree, datum: &datum, spec };

@@ -6,6 +6,7 @@ use crate::assembly::Analysis;
 use crate::assembly::error_tree::ErrorTree;
 use crate::assembly::fault::{self, ErrorMode, FaultKind};
 use crate::assembly::liaison::Liaison;
+use crate::assembly::piece::Workshop;
 use crate::assembly::place::place;
 use crate::design::Loaded;
 use crate::design::model::{Design, Part, Station};
@@ -14,7 +15,7 @@ use crate::diag::{Diagnostic, Sources};
 use crate::runtime::model::Model;
 use crate::scene::Body;
 use crate::scene::build::{self, Instance};
-use crate::solid::{Quality, Solid, evaluate};
+use crate::solid::{Quality, Solid};
 use crate::train::{Step, shots};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -190,11 +191,15 @@ fn no_station(design: &Design, name: &str) -> Diagnostic {
 /// another part (E0403).
 pub(crate) fn shapes(design: &Design) -> Result<Vec<[Arc<Solid>; 3]>, Vec<Diagnostic>> {
     let limits = [design.nominal(), design.mmc(), design.lmc()];
-    let (mut shapes, mut faults) = (Vec::new(), Vec::new());
+    let (mut shapes, mut faults, mut workshop) = (Vec::new(), Vec::new(), Workshop::default());
+    let mut compared = BTreeSet::new();
     for part in &design.parts {
-        match at_limits(part, &limits) {
+        match at_limits(part, &limits, &mut workshop) {
             Ok(solids) => {
-                faults.extend(changed(part, &solids));
+                // Pieces that are alike are compared once.
+                if compared.insert(solids.each_ref().map(Arc::as_ptr)) {
+                    faults.extend(changed(part, &solids));
+                }
                 shapes.push(solids);
             }
             Err(found) => faults.extend(found),
@@ -203,9 +208,13 @@ pub(crate) fn shapes(design: &Design) -> Result<Vec<[Arc<Solid>; 3]>, Vec<Diagno
     if faults.is_empty() { Ok(shapes) } else { Err(faults) }
 }
 
-fn at_limits(part: &Part, [nominal, mmc, lmc]: &[Vec<f64>; 3]) -> Result<[Arc<Solid>; 3], Vec<Diagnostic>> {
+fn at_limits(
+    part: &Part,
+    [nominal, mmc, lmc]: &[Vec<f64>; 3],
+    workshop: &mut Workshop,
+) -> Result<[Arc<Solid>; 3], Vec<Diagnostic>> {
     let quality = Quality::default();
-    let at = |values: &[f64]| evaluate(part, values, &quality).map(Arc::new);
+    let mut at = |values: &[f64]| workshop.solid(part, values, &quality);
     Ok([at(nominal)?, at(mmc)?, at(lmc)?])
 }
 

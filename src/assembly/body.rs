@@ -84,7 +84,8 @@ impl Body {
     /// The triangles of a face that come near a box, in the assembly's frame.
     pub fn triangles(&self, face: usize, near: &Bounds) -> Vec<[Point3<f64>; 3]> {
         let own = &self.blank.faces[face];
-        let place = |t: u32| self.solid.mesh.triangles[t as usize].map(|i| self.pose * self.solid.mesh.positions[i as usize]);
+        let place =
+            |t: u32| self.solid.mesh.triangles[t as usize].map(|i| self.pose * self.solid.mesh.positions[i as usize]);
         match &own.tree {
             None => own.triangles.iter().map(|t| place(*t)).collect(),
             Some(tree) => {
@@ -118,9 +119,12 @@ impl Blank {
 impl BlankFace {
     fn new(solid: &Solid, face: &Face, triangles: Vec<u32>) -> Self {
         let mut own = BlankFace { triangles, bounds: Bounds::EMPTY, tree: None, ring: ring(solid, face) };
-        own.bounds = own.corners(solid).fold(Bounds::EMPTY, |b, p| Bounds { low: b.low.inf(&p.coords), high: b.high.sup(&p.coords) });
+        own.bounds = own
+            .corners(solid)
+            .fold(Bounds::EMPTY, |b, p| Bounds { low: b.low.inf(&p.coords), high: b.high.sup(&p.coords) });
         if own.triangles.len() > MANY {
-            let bounds = |t: &u32| Bounds::of(&solid.mesh.triangles[*t as usize].map(|i| solid.mesh.positions[i as usize]));
+            let bounds =
+                |t: &u32| Bounds::of(&solid.mesh.triangles[*t as usize].map(|i| solid.mesh.positions[i as usize]));
             own.tree = Some(BoxTree::new(own.triangles.iter().map(bounds).collect()));
         }
         own

@@ -168,7 +168,12 @@ mod tests {
     fn some_boxes(count: usize) -> Vec<Bounds> {
         let mut stream = Stream::new(1, "boxes", 0);
         let mut point = |scale: f64| Vector3::from_fn(|_, _| stream.between(0.0, scale));
-        (0..count).map(|_| point(50.0)).collect::<Vec<_>>().into_iter().map(|low| Bounds { low, high: low + point(6.0) }).collect()
+        (0..count)
+            .map(|_| point(50.0))
+            .collect::<Vec<_>>()
+            .into_iter()
+            .map(|low| Bounds { low, high: low + point(6.0) })
+            .collect()
     }
 
     #[test]

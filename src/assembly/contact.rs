@@ -371,7 +371,11 @@ impl Common {
     fn of_rings(f: &PlacedFace, own: [f64; 2], g: &PlacedFace, other: [f64; 2], c: &Candidate) -> Option<Common> {
         let span = |face: &PlacedFace, [low, high]: [f64; 2]| {
             let base = face.surface.origin().coords.dot(&c.direction);
-            if face.surface.axis().dot(&c.direction) > 0.0 { [base + low, base + high] } else { [base - high, base - low] }
+            if face.surface.axis().dot(&c.direction) > 0.0 {
+                [base + low, base + high]
+            } else {
+                [base - high, base - low]
+            }
         };
         let (p, q) = (span(f, own), span(g, other));
         let span = [p[0].max(q[0]), p[1].min(q[1])];

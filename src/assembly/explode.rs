@@ -16,7 +16,8 @@ const GAP: f64 = 5.0;
 /// How far each component moves (mm). `poses` as the solids: one per component.
 pub fn exploded(insertion: &Insertion, solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
     let mut view = View { insertion, solids, poses, shifts: vec![Vector3::zeros(); solids.len()] };
-    let leaves = |c: &usize| insertion.rounds.iter().chain(insertion.groups.iter().map(|g| &g.members)).any(|r| r.contains(c));
+    let leaves =
+        |c: &usize| insertion.rounds.iter().chain(insertion.groups.iter().map(|g| &g.members)).any(|r| r.contains(c));
     let mut placed: Vec<usize> = (0..solids.len()).filter(|c| !leaves(c)).collect();
     for round in (0..=insertion.rounds.len()).rev() {
         if let Some(round) = insertion.rounds.get(round) {
@@ -108,7 +109,8 @@ mod tests {
             }
         }
         for pair in found.rounds.windows(2) {
-            let clears = |c: &usize| pair[1].iter().all(|below| extents[*c].low[2] > extents[*below].high[2] + GAP - 1e-6);
+            let clears =
+                |c: &usize| pair[1].iter().all(|below| extents[*c].low[2] > extents[*below].high[2] + GAP - 1e-6);
             assert!(pair[0].iter().all(clears));
         }
     }

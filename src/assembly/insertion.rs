@@ -194,19 +194,15 @@ fn stuck(rest: &[usize], tables: &[Table]) -> Vec<usize> {
     rest.iter().for_each(|c| present[*c] = true);
     let rings = strong_components(blocks, &present).into_iter().map(|(members, _)| members).filter(|m| m.len() > 1);
     let ringed: BTreeSet<usize> = rings.flatten().collect();
-    let cyclic: Vec<usize> =
-        rest.iter().copied().filter(|c| ringed.contains(c) || blocks[*c].contains(&0)).collect();
+    let cyclic: Vec<usize> = rest.iter().copied().filter(|c| ringed.contains(c) || blocks[*c].contains(&0)).collect();
     if cyclic.is_empty() { rest.to_vec() } else { cyclic }
 }
 
 /// Who holds whom: for every locked component and every direction tried.
 fn held(locked: &[usize], tables: &[Table]) -> Vec<Held> {
     let along = |component: usize| {
-        let holds = move |t: &Table| Held {
-            component,
-            direction: coordinates(t.direction),
-            by: t.blocks[component].clone(),
-        };
+        let holds =
+            move |t: &Table| Held { component, direction: coordinates(t.direction), by: t.blocks[component].clone() };
         tables.iter().map(holds)
     };
     locked.iter().flat_map(|c| along(*c)).collect()
@@ -229,6 +225,7 @@ pub struct InsertionSummary {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub held: Vec<(String, [f64; 3], Vec<String>)>,
     /// Who is in whose way along the common direction.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub blocked_by: Vec<(String, Vec<String>)>,
 }
 

@@ -8,6 +8,7 @@ pub mod error_tree;
 pub mod fault;
 pub mod insertion;
 pub mod liaison;
+pub mod piece;
 pub mod place;
 pub mod turn;
 
@@ -22,12 +23,12 @@ mod meeting;
 mod overlap;
 mod play;
 mod rest;
+#[cfg(test)]
+pub(crate) mod sample;
 mod sides;
 mod silhouette;
 mod tangent;
 mod tight;
-#[cfg(test)]
-pub(crate) mod sample;
 
 use crate::design::model::Design;
 use crate::diag::Diagnostic;

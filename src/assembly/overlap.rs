@@ -281,7 +281,8 @@ mod tests {
 
     #[test]
     fn an_angle_past_a_whole_turn_is_the_same_angle() {
-        let o = overlap(&square(-0.5, 0.0, 1.0), &square(TAU - 0.25, 0.0, 1.0), [Some(TAU), None]).expect("they overlap");
+        let o =
+            overlap(&square(-0.5, 0.0, 1.0), &square(TAU - 0.25, 0.0, 1.0), [Some(TAU), None]).expect("they overlap");
         assert!((o.area - 0.75).abs() < 1e-12, "{o:?}");
     }
 

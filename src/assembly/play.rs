@@ -84,7 +84,9 @@ impl Mating<'_> {
                 if lies.len() != still.len() {
                     return None;
                 }
-                lies.iter_mut().zip(still).for_each(|(l, s)| *l = Lie { gap: l.gap - s.gap, offset: l.offset - s.offset });
+                lies.iter_mut()
+                    .zip(still)
+                    .for_each(|(l, s)| *l = Lie { gap: l.gap - s.gap, offset: l.offset - s.offset });
             }
             if ends.iter().flatten().any(|l| l.gap.abs() + l.offset.norm() > NOTHING) {
                 moves.push(Move { dim, values: [range.low, range.high], ends });

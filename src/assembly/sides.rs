@@ -61,58 +61,15 @@ fn own_feature(part: &Part, face: &str) -> Option<Side> {
 fn feature_dims(feature: &Feature, out: &mut Vec<DimId>) {
     for copy in &feature.copies {
         pose_dims(&copy.pose, out);
-        shape_dims(&copy.shape, out);
+        copy.shape.exprs().into_iter().for_each(|e| e.dims(out));
+        if let Shape::Group { features } = &copy.shape {
+            features.iter().for_each(|f| feature_dims(f, out));
+        }
     }
 }
 
 fn pose_dims(pose: &PoseExpr, out: &mut Vec<DimId>) {
     pose.t.iter().chain(&pose.r).for_each(|e| e.dims(out));
-}
-
-fn shape_dims(shape: &Shape, out: &mut Vec<DimId>) {
-    let length = |h: &Extent, out: &mut Vec<DimId>| {
-        if let Extent::Length(e) = h {
-            e.dims(out);
-        }
-    };
-    match shape {
-        Shape::Box { x, y, z } => {
-            [x, y].into_iter().for_each(|e| e.dims(out));
-            length(z, out);
-        }
-        Shape::Cylinder { d, h } => {
-            d.dims(out);
-            length(h, out);
-        }
-        Shape::Cone { d1, d2, h } => {
-            [d1, d2].into_iter().for_each(|e| e.dims(out));
-            length(h, out);
-        }
-        Shape::Sphere { d } => d.dims(out),
-        Shape::Torus { d, tube } => [d, tube].into_iter().for_each(|e| e.dims(out)),
-        Shape::Prism { outline, h } => {
-            outline_dims(outline, out);
-            length(h, out);
-        }
-        Shape::Revolve { outline } => outline_dims(outline, out),
-        Shape::Group { features } => features.iter().for_each(|f| feature_dims(f, out)),
-    }
-}
-
-fn outline_dims(outline: &Outline, out: &mut Vec<DimId>) {
-    let corner = |c: &Corner, out: &mut Vec<DimId>| match c {
-        Corner::Sharp => {}
-        Corner::Round(e) | Corner::Chamfer(e) => e.dims(out),
-    };
-    outline.start.iter().for_each(|e| e.dims(out));
-    corner(&outline.start_corner, out);
-    for side in &outline.sides {
-        side.to.iter().for_each(|e| e.dims(out));
-        corner(&side.corner, out);
-        if let OutlinePath::Arc { radius, .. } = &side.path {
-            radius.dims(out);
-        }
-    }
 }
 
 /// A surface carried along by a rigid motion.

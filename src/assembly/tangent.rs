@@ -41,9 +41,8 @@ pub(crate) fn tangent(faces: [&PlacedFace; 2], bodies: [&Body; 2], index: [usize
         let out = |face: &PlacedFace| face.surface.normal_at(&p) * if face.outward { 1.0 } else { -1.0 };
         let opposed = (out(f) + out(g)).norm() < OPPOSED;
         let here = Bounds { low: p.coords, high: p.coords }.widened(REACHED);
-        let reached = |k: usize| {
-            bodies[k].triangles(index[k], &here).iter().any(|t| distance_to_triangle(&p, t) < REACHED)
-        };
+        let reached =
+            |k: usize| bodies[k].triangles(index[k], &here).iter().any(|t| distance_to_triangle(&p, t) < REACHED);
         let touches = gap.abs() <= TOUCH && opposed && reached(0) && reached(1);
         touches.then(|| Tangent { point: p, normal: Unit::new_normalize(out(f)), gap })
     })?;
@@ -142,9 +141,9 @@ fn towards(surface: &Surface, from: &Point3<f64>) -> Vec<Vector3<f64>> {
     };
     let off_axis = (from - surface.origin()).cross(&axis).norm() > TOUCH;
     match surface {
-        Surface::Cylinder { .. } | Surface::Cone { .. } if !off_axis => {
-            round(axis).map(|out| (out * (1.0f64 - slant * slant).sqrt() - axis.into_inner() * slant).normalize()).collect()
-        }
+        Surface::Cylinder { .. } | Surface::Cone { .. } if !off_axis => round(axis)
+            .map(|out| (out * (1.0f64 - slant * slant).sqrt() - axis.into_inner() * slant).normalize())
+            .collect(),
         _ => normal.try_normalize(0.5).into_iter().collect(),
     }
 }

@@ -23,16 +23,12 @@ const SAME: f64 = 1e-9;
 const NAMED: usize = 4;
 
 /// W0502, in the order of the components whose placement is most to blame.
-pub(crate) fn warnings(
-    design: &Design,
-    solids: &[Arc<Solid>],
-    liaison: &Liaison,
-    tight: &[Tight],
-) -> Vec<Diagnostic> {
+pub(crate) fn warnings(design: &Design, solids: &[Arc<Solid>], liaison: &Liaison, tight: &[Tight]) -> Vec<Diagnostic> {
     let axes = axes(design);
     let mut worst: BTreeMap<Told, (usize, Case)> = BTreeMap::new();
     for tight in tight {
-        let Some(contact) = liaison.between(tight.a.component, tight.b.component).find(|c| c.a == tight.a && c.b == tight.b)
+        let Some(contact) =
+            liaison.between(tight.a.component, tight.b.component).find(|c| c.a == tight.a && c.b == tight.b)
         else {
             continue;
         };
@@ -69,8 +65,12 @@ fn axes(design: &Design) -> Axes {
     let mut axes = Axes::new();
     for (component, c) in design.components.iter().enumerate() {
         for (axis, expr) in c.pose.t.iter().chain(&c.pose.r).enumerate() {
-            if let Expr::Dim(dim) = expr {
-                axes.entry(*dim).or_insert((component, axis));
+            // A name shared with a size is not the placement's alone to tighten.
+            let own = |dim: &DimId| design.dims[dim.0 as usize].name == format!("{}.{}", c.name, AXES[axis]);
+            if let Expr::Dim(dim) = expr
+                && own(dim)
+            {
+                axes.insert(*dim, (component, axis));
             }
         }
     }
@@ -102,7 +102,8 @@ impl Case<'_> {
             Diagnostic::warning("W0502", span, message)
                 .label(format!("limits and zones leave {low:.4} to {high:.4} mm between them"))
         } else {
-            let (hole, pin) = (face_name(design, solids, hollow(self.contact)), face_name(design, solids, full(self.contact)));
+            let (hole, pin) =
+                (face_name(design, solids, hollow(self.contact)), face_name(design, solids, full(self.contact)));
             Diagnostic::warning("W0502", span, format!("`{pin}` can meet `{hole}` within tolerance")).label(self.room())
         };
         let warning = match self.contributors(design) {
@@ -142,12 +143,13 @@ impl Case<'_> {
         let share = placed.or_else(|| self.shares.iter().find(alone))?;
         let kept = 1.0 - self.missing / share.loss;
         let dim = &design.dims[share.dim.0 as usize];
-        let (scale, unit) = if dim.quantity == Quantity::Angle { (1f64.to_degrees(), " deg") } else { (1.0, "") };
+        let axis = self.axes.get(&share.dim).map(|(_, axis)| *axis);
+        let turns = dim.quantity == Quantity::Angle || axis.is_some_and(|a| a >= 3);
+        let (scale, unit) = if turns { (1f64.to_degrees(), " deg") } else { (1.0, "") };
         let room = (share.at - dim.range.nominal) * kept * scale;
         let nominal = (dim.range.nominal * scale * 1e6).round() / 1e6 + 0.0;
-        if let Some((_, axis)) = self.axes.get(&share.dim) {
-            let axis = ["x", "y", "z", "rx", "ry", "rz"][*axis];
-            return Some(format!("{axis} = {nominal} ±{}{unit}", rounded_down(room.abs())));
+        if let Some(axis) = axis {
+            return Some(format!("{} = {nominal} ±{}{unit}", AXES[axis], rounded_down(room.abs())));
         }
         let limit = nominal + rounded_down(room.abs()).parse::<f64>().unwrap_or(0.0) * room.signum();
         let limit = (limit * 1e6).round() / 1e6;
@@ -163,5 +165,7 @@ fn rounded_down(value: f64) -> String {
     format!("{:.decimals$}", (value * scale + 1e-9).floor() / scale)
 }
 
+/// The axes of a placement as the spec calls them.
+const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 /// Finer than a nanometre nothing is said.
 const MOST_DECIMALS: f64 = 6.0;

@@ -1,0 +1,147 @@
+//! Which pieces are the same solid.
+//!
+//! In: parts and values. Out: a key that is equal for two pieces exactly when they have the same features with the same
+//! names and numbers, whatever dimensions the numbers come from; and one solid per distinct key. A part placed a hundred
+//! times has a hundred entries in the design, because pieces may differ; at nominal they are one solid.
+
+use crate::design::model::{Corner, Extent, Feature, Outline, OutlinePath, Part, PoseExpr, Shape, Values};
+use crate::diag::Diagnostic;
+use crate::solid::{Quality, Solid, evaluate};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Solids by what they are made of.
+#[derive(Default)]
+pub struct Workshop {
+    known: BTreeMap<Vec<u64>, Arc<Solid>>,
+}
+
+impl Workshop {
+    /// The solid of a part at these dimensions, made once for all pieces that are alike.
+    pub fn solid(&mut self, part: &Part, values: &Values, quality: &Quality) -> Result<Arc<Solid>, Vec<Diagnostic>> {
+        let key = key(part, values);
+        if let Some(known) = self.known.get(&key) {
+            return Ok(known.clone());
+        }
+        let solid = Arc::new(evaluate(part, values, quality)?);
+        self.known.insert(key, solid.clone());
+        Ok(solid)
+    }
+
+    /// How many distinct solids were made.
+    pub fn made(&self) -> usize {
+        self.known.len()
+    }
+}
+
+/// What a piece is made of, as numbers.
+fn key(part: &Part, values: &Values) -> Vec<u64> {
+    let mut key = Key { values, words: Vec::new() };
+    key.features(&part.features);
+    key.words
+}
+
+struct Key<'a> {
+    values: &'a Values,
+    words: Vec<u64>,
+}
+
+impl Key<'_> {
+    fn features(&mut self, features: &[Feature]) {
+        self.words.push(features.len() as u64);
+        for feature in features {
+            self.name(&feature.name);
+            self.words.extend([feature.op as u64, u64::from(feature.patterned), feature.copies.len() as u64]);
+            for copy in &feature.copies {
+                self.shape(&copy.shape);
+                self.pose(&copy.pose);
+            }
+        }
+    }
+
+    fn name(&mut self, name: &str) {
+        self.words.push(name.len() as u64);
+        self.words.extend(name.bytes().map(u64::from));
+    }
+
+    /// The kind of shape and how it is built, then its numbers.
+    fn shape(&mut self, shape: &Shape) {
+        match shape {
+            Shape::Box { z, .. } => self.kind(0, Some(z)),
+            Shape::Cylinder { h, .. } => self.kind(1, Some(h)),
+            Shape::Cone { h, .. } => self.kind(2, Some(h)),
+            Shape::Sphere { .. } => self.kind(3, None),
+            Shape::Torus { .. } => self.kind(4, None),
+            Shape::Prism { outline, h } => {
+                self.kind(5, Some(h));
+                self.outline(outline);
+            }
+            Shape::Revolve { outline } => {
+                self.kind(6, None);
+                self.outline(outline);
+            }
+            Shape::Group { features } => {
+                self.kind(7, None);
+                self.features(features);
+            }
+        }
+        let numbers: Vec<u64> = shape.exprs().into_iter().map(|e| e.eval(self.values).to_bits()).collect();
+        self.words.push(numbers.len() as u64);
+        self.words.extend(numbers);
+    }
+
+    fn kind(&mut self, kind: u64, extent: Option<&Extent>) {
+        let through = matches!(extent, Some(Extent::Through));
+        self.words.extend([kind, u64::from(through)]);
+    }
+
+    fn outline(&mut self, outline: &Outline) {
+        self.words.extend([outline.sides.len() as u64, corner(&outline.start_corner)]);
+        for side in &outline.sides {
+            self.name(&side.name);
+            let path = match side.path {
+                OutlinePath::Line => 0,
+                OutlinePath::Arc { left, long, .. } => 1 + 2 * u64::from(left) + 4 * u64::from(long),
+            };
+            self.words.extend([path, corner(&side.corner)]);
+        }
+    }
+
+    fn pose(&mut self, pose: &PoseExpr) {
+        let values = self.values;
+        self.words.extend(pose.t.iter().chain(&pose.r).map(|e| e.eval(values).to_bits()));
+    }
+}
+
+fn corner(corner: &Corner) -> u64 {
+    match corner {
+        Corner::Sharp => 0,
+        Corner::Round(_) => 1,
+        Corner::Chamfer(_) => 2,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assembly::sample::{Cut, Shop};
+
+    #[test]
+    fn pieces_with_equal_numbers_are_one_solid_and_others_are_not() {
+        let mut shop = Shop::default();
+        let hole = |d: f64| [Cut::hole("hole", 1.0, 0.0, d, 0.01)];
+        let parts = [hole(4.0), hole(4.0), hole(5.0)].map(|cuts| shop.plate("plate", [2.0, 0.1], [20.0, 0.1], &cuts));
+        parts.iter().for_each(|p| {
+            shop.place("plate", *p, [0.0; 3], 0.0, 0.0);
+        });
+        let design = shop.finish().design;
+        let mut workshop = Workshop::default();
+        let quality = Quality::default();
+        let mut make =
+            |part: usize, values: &[f64]| workshop.solid(&design.parts[part], values, &quality).expect("a plate");
+        let nominal = parts.map(|p| make(p, &design.nominal()));
+        assert!(Arc::ptr_eq(&nominal[0], &nominal[1]) && !Arc::ptr_eq(&nominal[0], &nominal[2]));
+        assert!(!Arc::ptr_eq(&nominal[0], &make(0, &design.mmc())));
+        assert_eq!(workshop.made(), 3);
+    }
+}
