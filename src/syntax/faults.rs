@@ -26,6 +26,9 @@ pub fn describe(text: &str, fault: &Fault, file: u32, offset: usize) -> Diagnost
         let help = format!("did you mean `{meant}`?");
         return Diagnostic::error("E0101", span(at, word.len()), message).label("not a feature").help(help);
     }
+    if let Some(slip) = placing_slip(text, fault.at) {
+        return Diagnostic::error(slip.code, span(slip.at, slip.len), slip.message).label(slip.label).help(slip.help);
+    }
     // Inside a token that takes no blanks the parser stops before them; the reader looks at what follows.
     let at = text.len() - text[fault.at..].trim_start_matches([' ', '\t']).len();
     let found = token_at(text, at);
@@ -50,6 +53,82 @@ fn bare_feature(text: &str, at: usize) -> Option<(usize, &str)> {
     let word = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     let bare = text[at..].starts_with('(') && word(name.trim()) && word(shape.trim());
     bare.then(|| (line_start + indent, name.trim()))
+}
+
+/// Where a statement that stands in the wrong block belongs: first words, block.
+const BLOCKS: [(&[&str], &str); 5] = [
+    (&["add", "cut", "keep", "outline"], "part"),
+    (&["root", "place", "measure"], "assembly"),
+    (&["camera", "light", "floor", "vary"], "station"),
+    (&["watch", "ignore"], "inspect"),
+    (&["from", "line", "arc"], "outline"),
+];
+
+/// Recognises a statement in the wrong block, a feature without `=`, a group placed behind its brace, and the words of an
+/// outline in the manner of arguments.
+fn placing_slip(text: &str, at: usize) -> Option<Slip> {
+    let at = text.len() - text[at..].trim_start_matches([' ', '\t']).len();
+    let found = token_at(text, at);
+    let line_start = text[..at].rfind('\n').map_or(0, |i| i + 1);
+    let before = text[line_start..at].trim();
+    let line = text[at..].lines().next().unwrap_or_default();
+    let slip = |message: String, label, help: String| {
+        Some(Slip { code: "E0101", at, len: found.len().max(1), message, label, help })
+    };
+    let behind = before.rsplit(' ').next().unwrap_or_default();
+    match found {
+        "on" | "at" | "turn" if before == "}" => slip(
+            "a group is placed before its brace".to_string(),
+            "too late",
+            format!("write `group {} {{`", line.trim_end()),
+        ),
+        "group" if before.is_empty() => {
+            let name = line["group".len()..].trim().trim_end_matches('{').trim();
+            let name = if name.is_empty() { "mount" } else { name };
+            slip("a group is added, cut or kept".to_string(), "how?", format!("write `cut {name} = group {{`"))
+        }
+        "=" if ["radius", "round", "chamfer", "to", "within", "from"].contains(&behind) => slip(
+            format!("`{behind}` takes no `=`"),
+            "not expected here",
+            format!("write `{behind} {}`", line[1..].trim()),
+        ),
+        "left" | "right" if before.ends_with(')') => slip(
+            format!("the radius stands before `{found}`"),
+            "not expected here",
+            format!("write `radius 10 {found}`"),
+        ),
+        _ if before.is_empty() => {
+            let (_, block) = BLOCKS.iter().find(|(words, _)| words.contains(&found))?;
+            if let ("part", Some(slip)) = (*block, bare_name(text, at)) {
+                return Some(slip);
+            }
+            let article = if *block == "part" || *block == "station" { "a" } else { "an" };
+            slip(
+                format!("`{found}` cannot stand here"),
+                "not in this block",
+                format!("move it into the braces of {article} `{block}`"),
+            )
+        }
+        _ => None,
+    }
+}
+
+/// The fault of `add mount group {`, whose operation at `at` is well placed: the sign behind the name is missing.
+fn bare_name(text: &str, at: usize) -> Option<Slip> {
+    let line = text[at..].lines().next()?;
+    let mut words = line.split_whitespace();
+    let (op, name, next) = (words.next()?, words.next()?, words.next()?);
+    let is_name = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    let offset = line.find(name)? + name.len();
+    let offset = offset + line[offset..].find(next)?;
+    (is_name && next != "=" && op != "outline").then(|| Slip {
+        code: "E0101",
+        at: at + offset,
+        len: token_at(text, at + offset).len().max(1),
+        message: format!("expected `=` behind `{op} {name}`"),
+        label: "not expected here",
+        help: format!("write `{op} {name} = {}`", line[offset..].trim()),
+    })
 }
 
 /// The word before `at`, if it was read as a unit but is nearly a keyword that is expected.

@@ -54,6 +54,9 @@ fn parse_chunk(text: &str, builder: &Builder, diagnostics: &mut Vec<Diagnostic>)
         let fault = fault(&error);
         diagnostics.push(faults::describe(&text, &fault, builder.file, builder.offset));
         text = Cow::Owned(without_statement(&text, fault.at)?);
+        if text.lines().all(|line| strip_comment(line).trim().is_empty()) {
+            return None;
+        }
     }
     None
 }
