@@ -3,12 +3,12 @@
 //! In: `root` and `place` statements. Out: components, parents before their children, each with its part, the frame it
 //! is placed in and its pose with its tolerance zone.
 
-use super::dimension::General;
 use super::fields::Fields;
 use super::model::{Component, Expr, Part, PoseExpr};
 use super::part::PartSource;
 use super::scope::{Remark, Resolver};
 use super::seat::{Seat, copies};
+use super::tolerance::General;
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{self, Stmt, Value};

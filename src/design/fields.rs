@@ -3,10 +3,10 @@
 //! In: `name = value` pairs. Out: single values in mm, rad and plain numbers, with a diagnostic for every name that is
 //! unknown, given twice or missing.
 
-use super::dimension::General;
 use super::feature::Names;
 use super::model::Expr;
 use super::scope::Resolver;
+use super::tolerance::General;
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{Args, Body, Dim, Name, Point, Stmt, Value};

@@ -16,6 +16,7 @@ pub mod model;
 mod outline;
 mod part;
 mod pattern;
+mod primitive;
 mod profile;
 mod scope;
 mod seat;
@@ -24,5 +25,6 @@ mod shape;
 mod station;
 mod sum;
 mod task;
+mod tolerance;
 
 pub use load::{Loaded, Read, load};

@@ -4,12 +4,13 @@
 //! every dimension of its own, or diagnostics that point at the side. Resolved once: whatever is made from it shares its
 //! dimensions.
 
-use super::dimension::{General, trim};
+use super::dimension::trim;
 use super::feature::Names;
 use super::fields::point_dims;
 use super::model::{Corner, DimId, Expr, Outline, OutlinePath, OutlineSide};
 use super::profile::{self, Fault};
 use super::scope::Resolver;
+use super::tolerance::General;
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{self, CornerKind, Stmt};

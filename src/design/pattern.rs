@@ -3,12 +3,12 @@
 //! `circle` turns each copy with its place; `line` runs from the feature's place along x; `grid` is centred on it and
 //! numbered in reading order, from -x to +x and from +y down to -y.
 
-use super::dimension::General;
 use super::feature::{Frame, Names};
 use super::fields::Fields;
 use super::interval::{half, times};
 use super::model::Expr;
 use super::scope::Resolver;
+use super::tolerance::General;
 use crate::diag::Diagnostic;
 use crate::syntax::ast::{self, Value};
 use crate::units::Quantity;

@@ -3,12 +3,13 @@
 //! In: a call such as `cylinder(d = 6 H7, h = through)`. Out: a [`Shape`] whose sizes are positive at every limit. What a
 //! workshop has its own word for (a hole, a countersink) is put together from the primitives in `hole`.
 
-use super::dimension::{General, trim};
+use super::dimension::trim;
 use super::feature::Context;
 use super::fields::Fields;
 use super::interval::bounds;
 use super::model::{Expr, Extent, Outline, Shape};
 use super::scope::Resolver;
+use super::tolerance::General;
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{self, Value};
