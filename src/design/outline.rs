@@ -22,6 +22,8 @@ const MAX_SIDES: usize = 200;
 
 /// What the dimensions of the first corner are named under.
 const START: &str = "start";
+/// How the faces of broken corners end: `rail.base_corner`.
+const CORNER: &str = "_corner";
 
 /// An outline of the part at hand.
 #[derive(Debug, Clone)]
@@ -130,7 +132,7 @@ impl Resolver {
         for line in &body.lines {
             let Stmt::Side(side) = &line.stmt else { continue };
             if let Some(own) = &side.name
-                && (!seen.insert(&own.text) || own.text == START)
+                && (!seen.insert(&own.text) || own.text == START || own.text.ends_with(CORNER))
             {
                 self.side_name_taken(own);
             }
@@ -172,9 +174,10 @@ impl Resolver {
     }
 
     fn side_name_taken(&mut self, name: &ast::Name) {
-        let message = match name.text == START {
-            true => format!("`{START}` is no name for a side: where an outline begins is called that"),
-            false => format!("two sides of one outline are named `{}`", name.text),
+        let message = match name.text.as_str() {
+            START => format!("`{START}` is no name for a side: where an outline begins is called that"),
+            text if text.ends_with(CORNER) => format!("`{text}` is no name for a side: broken corners are called that"),
+            text => format!("two sides of one outline are named `{text}`"),
         };
         self.report(Diagnostic::error("E0202", name.span, message).label("taken").help("choose another name"));
     }
@@ -322,7 +325,7 @@ impl Placed {
             }
             Fault::NoRoom { side } => {
                 let message = "breaking this corner leaves nothing of a side".to_string();
-                let help = "make the corner's size smaller; a full round is an `arc`";
+                let help = "make the corner's size smaller";
                 told(side, message, "too large for the sides beside it", help)
             }
             Fault::Touch { sides: [a, b], at } => {

@@ -17,6 +17,8 @@ pub struct Stretch {
     /// The side it belongs to, counted from 0; the straight side that closes the outline comes last. A broken corner
     /// belongs to the side before it.
     pub side: usize,
+    /// Whether it stands for the corner behind that side.
+    pub corner: bool,
     pub from: Point,
     pub to: Point,
     pub bend: Option<Bend>,
@@ -178,11 +180,11 @@ fn straight_and_round(outline: &Outline, values: &Values) -> Result<Vec<Stretch>
             OutlinePath::Line => None,
             OutlinePath::Arc { radius, left, long } => Some(bend(side, [from, to], radius.eval(values), *left, *long)?),
         };
-        sides.push(Stretch { side, from, to, bend });
+        sides.push(Stretch { side, corner: false, from, to, bend });
         from = to;
     }
     if !near(from, start) {
-        sides.push(Stretch { side: sides.len(), from, to: start, bend: None });
+        sides.push(Stretch { side: sides.len(), corner: false, from, to: start, bend: None });
     }
     Ok(sides)
 }
@@ -238,13 +240,15 @@ fn breaks(outline: &Outline, values: &Values, sides: &[Stretch]) -> Result<Vec<O
     corners.iter().enumerate().map(broken).collect()
 }
 
+/// A straight side that its corners use up to the end is left out: two equal rounds make a full round.
 fn with_corners(sides: &[Stretch], breaks: &[Option<Break>]) -> Result<Vec<Stretch>, Fault> {
     let n = sides.len();
     let back = |i: usize| breaks[i % n].map_or(0.0, |b| b.setback);
     let mut shortened = Vec::with_capacity(n);
     for (i, s) in sides.iter().enumerate() {
         let (before, behind) = (back(i + n - 1), back(i));
-        if s.bend.is_none() && before + behind > distance(s.from, s.to) - SAME_POINT {
+        let left = distance(s.from, s.to) - before - behind;
+        if s.bend.is_none() && left < -SAME_POINT {
             let culprit = if behind > 0.0 { s } else { &sides[(i + n - 1) % n] };
             return Err(Fault::NoRoom { side: culprit.side });
         }
@@ -254,23 +258,25 @@ fn with_corners(sides: &[Stretch], breaks: &[Option<Break>]) -> Result<Vec<Stret
     }
     let mut all = Vec::new();
     for (i, s) in shortened.iter().enumerate() {
-        all.push(*s);
+        if s.bend.is_some() || !near(s.from, s.to) {
+            all.push(*s);
+        }
         if let Some(corner) = breaks[i] {
-            all.push(corner_stretch(s, &shortened[(i + 1) % n], corner));
+            all.push(corner_stretch([&sides[i], &sides[(i + 1) % n]], s.to, shortened[(i + 1) % n].from, corner));
         }
     }
     Ok(all)
 }
 
-/// The stretch that stands for the corner between two shortened sides.
-fn corner_stretch(a: &Stretch, b: &Stretch, corner: Break) -> Stretch {
+/// The stretch that stands for the corner between two straight sides.
+fn corner_stretch([a, b]: [&Stretch; 2], from: Point, to: Point, corner: Break) -> Stretch {
     let bend = corner.radius.map(|radius| {
         let along = scaled(minus(a.to, a.from), 1.0 / distance(a.from, a.to));
         let left = cross(along, minus(b.to, b.from)) > 0.0;
         let inward = if left { [-along[1], along[0]] } else { [along[1], -along[0]] };
-        Bend { centre: plus(a.to, scaled(inward, radius)), radius, left }
+        Bend { centre: plus(from, scaled(inward, radius)), radius, left }
     });
-    Stretch { side: a.side, from: a.to, to: b.from, bend }
+    Stretch { side: a.side, corner: true, from, to, bend }
 }
 
 /// The angle an arc sweeps, over 0 up to a whole turn (rad).
@@ -424,13 +430,20 @@ mod tests {
     }
 
     #[test]
+    fn two_equal_rounds_make_a_full_round() {
+        let stadium = trace(&square(|| Corner::Round(Expr::Const(5.0))), &[]).unwrap();
+        assert_eq!(stadium.len(), 4);
+        assert!((area(&stadium) - 25.0 * PI).abs() < 1e-9 && touching(&stadium).is_none());
+    }
+
+    #[test]
     fn corners_need_room_and_straight_sides() {
         let with = |corner: Corner| {
             let mut square = square(|| Corner::Sharp);
             square.sides[1].corner = corner;
             square
         };
-        let no_room = trace(&with(Corner::Round(Expr::Const(10.0))), &[]);
+        let no_room = trace(&with(Corner::Round(Expr::Const(10.1))), &[]);
         assert_eq!(no_room, Err(Fault::NoRoom { side: 1 }));
         let mut arched = with(Corner::Chamfer(Expr::Const(1.0)));
         arched.sides[2].path = OutlinePath::Arc { radius: Expr::Const(8.0), left: true, long: false };

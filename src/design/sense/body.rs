@@ -3,7 +3,7 @@
 //! In: a [`Part`] and one value per dimension. Out: whether a point is in its material, and the faces of its primitives
 //! with points on them. Every primitive is one of two: an outline extruded along z, or an outline turned about z.
 
-use super::super::model::{Expr, Extent, Feature, FeatureCopy, Op, Part, PoseExpr, Shape, Values};
+use super::super::model::{Expr, Extent, Feature, FeatureCopy, Op, Outline, Part, PoseExpr, Shape, Values};
 use super::super::profile::{self, Bend, Stretch};
 use crate::diag::Span;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -287,7 +287,7 @@ fn form(shape: &Shape, values: &Values) -> Option<(Form, Vec<String>)> {
         Shape::Cylinder { d, h } => prism(circle([0.0, 0.0], v(d) / 2.0), height(h), vec!["side".to_string(); 2]),
         Shape::Prism { outline, h } => {
             let stretches = profile::trace(outline, values).ok()?;
-            let names = stretches.iter().map(|s| side_name(outline, s.side)).collect();
+            let names = stretches.iter().map(|s| side_name(outline, s)).collect();
             prism(stretches, height(h), names)
         }
         Shape::Cone { d1, d2, h } => {
@@ -301,8 +301,8 @@ fn form(shape: &Shape, values: &Values) -> Option<(Form, Vec<String>)> {
         Shape::Sphere { d } => {
             let r = v(d) / 2.0;
             let bend = Some(Bend { centre: [0.0, 0.0], radius: r, left: true });
-            let half = Stretch { side: 0, from: [0.0, -r], to: [0.0, r], bend };
-            let axis = Stretch { side: 1, from: [0.0, r], to: [0.0, -r], bend: None };
+            let half = Stretch { side: 0, corner: false, from: [0.0, -r], to: [0.0, r], bend };
+            let axis = Stretch { side: 1, corner: false, from: [0.0, r], to: [0.0, -r], bend: None };
             (Form::Turned(vec![half, axis]), ["side", "axis"].map(String::from).to_vec())
         }
         Shape::Torus { d, tube } => {
@@ -310,7 +310,7 @@ fn form(shape: &Shape, values: &Values) -> Option<(Form, Vec<String>)> {
         }
         Shape::Revolve { outline } => {
             let stretches = profile::trace(outline, values).ok()?;
-            let names = stretches.iter().map(|s| side_name(outline, s.side)).collect();
+            let names = stretches.iter().map(|s| side_name(outline, s)).collect();
             (Form::Turned(stretches), names)
         }
         Shape::Group { .. } => return None,
@@ -324,19 +324,25 @@ fn prism(outline: Vec<Stretch>, height: Option<f64>, mut names: Vec<String>) -> 
     (Form::Prism(outline, height), names)
 }
 
-/// A side by its name, the closing one by its number.
-fn side_name(outline: &super::super::model::Outline, side: usize) -> String {
-    outline.sides.get(side).map_or_else(|| (side + 1).to_string(), |s| s.name.clone())
+/// A side by its name, the closing one by its number, a broken corner by the side before it.
+fn side_name(outline: &Outline, stretch: &Stretch) -> String {
+    let side = outline.sides.get(stretch.side).map_or_else(|| (stretch.side + 1).to_string(), |s| s.name.clone());
+    if stretch.corner { format!("{side}_corner") } else { side }
 }
 
 fn polygon(corners: &[[f64; 2]]) -> Vec<Stretch> {
     let n = corners.len();
-    (0..n).map(|side| Stretch { side, from: corners[side], to: corners[(side + 1) % n], bend: None }).collect()
+    (0..n)
+        .map(|side| Stretch { side, corner: false, from: corners[side], to: corners[(side + 1) % n], bend: None })
+        .collect()
 }
 
 /// Two halves of a circle, counter-clockwise.
 fn circle(centre: [f64; 2], radius: f64) -> Vec<Stretch> {
     let [right, left] = [radius, -radius].map(|x| [centre[0] + x, centre[1]]);
     let bend = Some(Bend { centre, radius, left: true });
-    vec![Stretch { side: 0, from: right, to: left, bend }, Stretch { side: 1, from: left, to: right, bend }]
+    vec![
+        Stretch { side: 0, corner: false, from: right, to: left, bend },
+        Stretch { side: 1, corner: false, from: left, to: right, bend },
+    ]
 }
