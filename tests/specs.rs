@@ -202,3 +202,13 @@ fn examples_of_the_manual_compile() {
         assert!(loaded.diagnostics.is_empty(), "{:#?}\n{text}", loaded.diagnostics);
     }
 }
+
+#[test]
+fn what_is_emitted_of_a_design_names_its_measures() {
+    let emitted = gonogo::artifacts::design(&design("shapes"));
+    assert!(
+        emitted.contains("\"flush\": (\"bracket.rail.top\", \"bushing.body.top\", Some((-0.01, 0.01)))"),
+        "{emitted}"
+    );
+    assert!(!gonogo::artifacts::design(&design("pinned_plate")).contains("measures"));
+}

@@ -12,7 +12,9 @@ use crate::assembly::contact::{Contact, FaceRef};
 use crate::assembly::error_tree::{self, ErrorTree};
 use crate::assembly::place::place;
 use crate::assembly::{insertion, liaison};
-use crate::design::model::{Component, Design, Dimension, Feature, LightShape, Op, Part, Shape, Station, Train};
+use crate::design::model::{
+    Component, Design, Dimension, FacePath, Feature, LightShape, Measure, Op, Part, Shape, Station, Train,
+};
 use crate::line::Stage;
 use crate::runtime::camera::Camera;
 use crate::runtime::model::{Hypothesis, Model, Node};
@@ -114,6 +116,12 @@ impl Artifact {
 /// A list that reads as a map, in its own order.
 struct Named<T>(Vec<(String, T)>);
 
+impl<T> Named<T> {
+    fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
 impl<T: Serialize> Serialize for Named<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len()))?;
@@ -146,6 +154,9 @@ struct DesignSummary<'a> {
     parts: Named<PartSummary<'a>>,
     /// Part, parent and nominal place in the parent's frame: x, y, z, rx, ry, rz.
     components: Named<(&'a str, Option<&'a str>, [f64; 6])>,
+    /// From which face to which, and the limits in mm.
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    measures: Named<(String, String, Option<[f64; 2]>)>,
     stations: Named<StationSummary<'a>>,
     watch: Vec<(&'a str, Option<u32>)>,
     false_reject: f64,
@@ -174,6 +185,7 @@ pub fn design(design: &Design) -> String {
         dimensions: Named(design.dims.iter().map(|d| (d.name.clone(), limits(d))).collect()),
         parts: Named(design.parts.iter().map(|p| (p.name.clone(), part(design, p))).collect()),
         components: Named(design.components.iter().map(|c| component(design, c)).collect()),
+        measures: Named(design.measures.iter().map(|m| (m.name.clone(), measure(design, m))).collect()),
         stations: Named(design.stations.iter().map(|s| (s.name.clone(), station(design, s))).collect()),
         watch: design.inspect.watch.iter().map(|w| (design.components[w.component].name.as_str(), w.depth)).collect(),
         false_reject: design.inspect.false_reject,
@@ -220,6 +232,12 @@ fn component<'a>(design: &'a Design, component: &'a Component) -> (String, Compo
     let place = [x, y, z, rx.to_degrees(), ry.to_degrees(), rz.to_degrees()].map(|v| rounded(v, 5));
     let parent = component.parent.map(|p| design.components[p].name.as_str());
     (component.name.clone(), (design.parts[component.part].name.as_str(), parent, place))
+}
+
+fn measure(design: &Design, measure: &Measure) -> (String, String, Option<[f64; 2]>) {
+    let face = |path: &FacePath| format!("{}.{}", design.components[path.component].name, path.face);
+    let limits = measure.limits.map(|r| [r.low, r.high].map(|v| rounded(v, 5)));
+    (face(&measure.from), face(&measure.to), limits)
 }
 
 fn station<'a>(design: &'a Design, station: &'a Station) -> StationSummary<'a> {
