@@ -103,13 +103,13 @@ pub enum Sample {
     Dot { round: bool },
 }
 
-/// What the lines of these classes and the circles mean.
-pub fn entries(classes: &[Class]) -> Vec<Entry<'static>> {
+/// What the lines of these classes and the circles of these surfaces (round or plane) mean: what is not drawn has no entry.
+pub fn entries(classes: &[Class], rounds: &[bool]) -> Vec<Entry<'static>> {
     let wires = Class::ALL.into_iter().filter(|c| classes.contains(c));
-    let mut entries: Vec<Entry> = wires.map(|c| Entry { sample: Sample::Wire(c), word: c.word() }).collect();
-    entries.push(Entry { sample: Sample::Dot { round: false }, word: "plane surface" });
-    entries.push(Entry { sample: Sample::Dot { round: true }, word: "round surface" });
-    entries
+    let wires = wires.map(|c| Entry { sample: Sample::Wire(c), word: c.word() });
+    let dots =
+        [(false, "plane surface"), (true, "round surface")].into_iter().filter(|(round, _)| rounds.contains(round));
+    wires.chain(dots.map(|(round, word)| Entry { sample: Sample::Dot { round }, word })).collect()
 }
 
 /// A row of samples and words, its top left corner at `at`.

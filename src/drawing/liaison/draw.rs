@@ -17,7 +17,9 @@ const MEETING: f64 = 0.2;
 /// Corners of the boxes (px).
 const CORNER: f64 = 7.0;
 /// From the drawing to the title above and to the legend below (px).
-const APART: f64 = 24.0;
+const APART: f64 = 20.0;
+/// From the base line of the title to that of the line below it (px).
+const LEADING: f64 = 17.0;
 /// A count stands this far beside and above the beginning of its wire (px).
 const COUNT: [f64; 2] = [7.0, -4.0];
 /// From the middle of a line of text to its base line, in sizes of the font.
@@ -142,16 +144,12 @@ fn surround(svg: &mut Svg, name: &str, graph: &Graph) {
     let [low, high] = svg.extent().unwrap_or([[0.0; 2]; 2]);
     let surfaces: usize = graph.boxes.iter().flat_map(|b| &b.rows).map(|r| r.faces.len()).sum();
     let counts = format!("{} components, {surfaces} mating surfaces, {} contacts", graph.boxes.len(), graph.contacts);
-    svg.text(
-        [low[0], low[1] - APART],
-        Anchor::Start,
-        HEADING,
-        &format!("Liaison diagram: {name}"),
-        "font-weight=\"bold\"",
-    );
-    svg.text([low[0], low[1] - APART + 1.4 * HEADING], Anchor::Start, NOTE, &counts, &format!("fill=\"{GREY}\""));
+    let (title, line) = (format!("Liaison diagram: {name}"), low[1] - APART);
+    svg.text([low[0], line - LEADING], Anchor::Start, HEADING, &title, "font-weight=\"bold\"");
+    svg.text([low[0], line], Anchor::Start, NOTE, &counts, &format!("fill=\"{GREY}\""));
     let mut classes: Vec<Class> = graph.wires.iter().map(|w| w.class).collect();
     classes.sort();
     classes.dedup();
-    ink::legend(svg, [low[0], high[1] + APART], &ink::entries(&classes));
+    let rounds: Vec<bool> = graph.boxes.iter().flat_map(|b| &b.rows).map(|r| r.round).collect();
+    ink::legend(svg, [low[0], high[1] + APART], &ink::entries(&classes, &rounds));
 }

@@ -110,13 +110,16 @@ impl Namer<'_> {
 
     /// `bore.side`, or `gap[1…36].side` for many.
     fn label(&self, faces: &[FaceRef]) -> String {
-        let [first, .., last] = faces else { return self.name(faces[0]).into() };
-        let (first, last) = (self.name(*first), self.name(*last));
-        let mut label = String::new();
-        for (a, b) in pieces(first).zip(pieces(last)) {
-            label.push_str(&if a == b { a.to_string() } else { format!("{a}…{b}") });
-        }
-        label
+        let names: Vec<Vec<&str>> = faces.iter().map(|f| pieces(self.name(*f)).collect()).collect();
+        let range = |i: usize| {
+            let piece = |name: &Vec<&str>| name.get(i).and_then(|p| p.parse::<u32>().ok());
+            let (low, high) = (names.iter().filter_map(piece).min(), names.iter().filter_map(piece).max());
+            match (low, high) {
+                (Some(low), Some(high)) if low < high => format!("{low}…{high}"),
+                _ => names[0][i].into(),
+            }
+        };
+        (0..names[0].len()).map(range).collect()
     }
 
     fn note(&self, contact: &Contact, count: usize) -> String {

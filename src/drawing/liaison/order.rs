@@ -14,6 +14,9 @@ const MOST_TRIALS: usize = 400_000;
 /// Wires between boxes further apart than this pass behind the boxes without a lane: a bound on the lanes.
 const LONGEST: usize = 12;
 
+/// Per slot and item its place in its column, from 0 at the top.
+type Ranks = Vec<Vec<usize>>;
+
 /// What stands in the columns and how the wires pass.
 pub(super) struct Net {
     /// Slots from the top, per column.
@@ -29,14 +32,14 @@ pub(super) struct Slot {
     /// The box; `None` for a lane.
     pub block: Option<usize>,
     pub layer: usize,
-    /// Rows of the box or wires of the lane, from the top.
+    /// Numbers of the rows of the box, or of the wires of the lane, from the top.
     pub items: Vec<usize>,
 }
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hop {
     pub slot: usize,
-    /// A value in [`Slot::items`].
+    /// Number of a row or wire: a value in [`Slot::items`].
     pub item: usize,
 }
 
@@ -80,8 +83,9 @@ impl Net {
                     self.slots.push(Slot { block: None, layer, items: Vec::new() });
                     self.slots.len() - 1
                 });
-                self.slots[slot].items.push(wire);
-                hops.push(Hop { slot, item: wire });
+                let item = self.slots[slot].items.len();
+                self.slots[slot].items.push(item);
+                hops.push(Hop { slot, item });
             }
         }
         hops.push(to);
@@ -89,15 +93,16 @@ impl Net {
     }
 
     /// The place of every item in its column, from 0 at the top: per slot, per item.
-    fn ranks(&self) -> Vec<BTreeMap<usize, usize>> {
-        let mut ranks = vec![BTreeMap::new(); self.slots.len()];
-        for layer in &self.layers {
-            let items = layer.iter().flat_map(|s| self.slots[*s].items.iter().map(move |i| (*s, *i)));
-            items.enumerate().for_each(|(rank, (slot, item))| {
-                ranks[slot].insert(item, rank);
-            });
-        }
+    fn ranks(&self) -> Ranks {
+        let mut ranks: Ranks = self.slots.iter().map(|s| vec![0; s.items.len()]).collect();
+        (0..self.layers.len()).for_each(|layer| self.rank(layer, &mut ranks));
         ranks
+    }
+
+    /// The same for one column.
+    fn rank(&self, layer: usize, ranks: &mut Ranks) {
+        let items = self.layers[layer].iter().flat_map(|s| self.slots[*s].items.iter().map(move |i| (*s, *i)));
+        items.enumerate().for_each(|(rank, (slot, item))| ranks[slot][item] = rank);
     }
 
     /// How often wires cross between columns.
@@ -105,7 +110,7 @@ impl Net {
         let ranks = self.ranks();
         let mut gutters: Vec<Vec<(usize, usize)>> = vec![Vec::new(); self.layers.len()];
         for pair in self.hops.iter().flat_map(|h| h.windows(2)) {
-            let [a, b] = [pair[0], pair[1]].map(|h| ranks[h.slot][&h.item]);
+            let [a, b] = [pair[0], pair[1]].map(|h| ranks[h.slot][h.item]);
             gutters[self.slots[pair[0].slot].layer].push((a, b));
         }
         gutters.into_iter().map(inversions).sum()
@@ -147,10 +152,11 @@ fn sorted(list: &mut [usize], buffer: &mut [usize]) -> usize {
 /// Sorts columns and rows.
 pub(super) fn sort(net: &mut Net) {
     let mut best = (net.crossings(), net.layers.clone(), items(net));
+    let mut ranks = net.ranks();
     for _ in 0..SWEEPS {
-        (1..net.layers.len()).for_each(|layer| settle(net, layer, true));
+        (1..net.layers.len()).for_each(|layer| settle(net, &mut ranks, layer, true));
         keep_better(net, &mut best);
-        (0..net.layers.len().saturating_sub(1)).rev().for_each(|layer| settle(net, layer, false));
+        (0..net.layers.len().saturating_sub(1)).rev().for_each(|layer| settle(net, &mut ranks, layer, false));
         keep_better(net, &mut best);
     }
     let (crossings, layers, items) = best;
@@ -173,26 +179,31 @@ fn keep_better(net: &Net, best: &mut Best) {
 }
 
 /// Sorts a column by where the wires to its left (or right) neighbours come from, and the rows by both sides.
-fn settle(net: &mut Net, layer: usize, from_left: bool) {
-    let ranks = net.ranks();
-    let sizes: Vec<f64> =
-        net.layers.iter().map(|l| l.iter().map(|s| net.slots[*s].items.len()).sum::<usize>().max(1) as f64).collect();
-    let height = |hop: &Hop| (ranks[hop.slot][&hop.item] as f64 + 0.5) / sizes[net.slots[hop.slot].layer];
-    let column = net.layers[layer].clone();
+fn settle(net: &mut Net, ranks: &mut Ranks, layer: usize, from_left: bool) {
+    let size = |layer: &Vec<usize>| layer.iter().map(|s| net.slots[*s].items.len()).sum::<usize>().max(1) as f64;
+    let sizes = [layer.checked_sub(1), Some(layer), Some(layer + 1)]
+        .map(|l| l.and_then(|l| net.layers.get(l)).map_or(1.0, size));
+    // Wires without lanes come from further away: their ends count as if they stood in the next column.
+    let side =
+        |hop: &Hop| 1 + usize::from(net.slots[hop.slot].layer > layer) - usize::from(net.slots[hop.slot].layer < layer);
+    let height = |hop: &Hop| ((ranks[hop.slot][hop.item] as f64 + 0.5) / sizes[side(hop)]).min(1.0);
     let mut keys: BTreeMap<usize, f64> = BTreeMap::new();
     let mut orders: Vec<(usize, Vec<usize>)> = Vec::new();
-    for slot in &column {
+    for slot in &net.layers[layer] {
+        let near = &net.near[*slot];
         let fixed = |hop: &&(usize, Hop)| (net.slots[hop.1.slot].layer < layer) == from_left;
         let own = net.slots[*slot].items.iter().map(|i| height(&Hop { slot: *slot, item: *i }));
-        let seen = mean(net.near[*slot].iter().filter(fixed).map(|(_, hop)| height(hop)));
+        let seen = mean(near.iter().filter(fixed).map(|(_, hop)| height(hop)));
         keys.insert(*slot, seen.or_else(|| mean(own)).unwrap_or(0.5));
-        let wish = |item: &usize| mean(net.near[*slot].iter().filter(|n| n.0 == *item).map(|(_, h)| height(h)));
-        let mut order: Vec<(Option<f64>, usize)> = net.slots[*slot].items.iter().map(|i| (wish(i), *i)).collect();
-        order.sort_by(|a, b| a.0.unwrap_or(0.5).total_cmp(&b.0.unwrap_or(0.5)));
-        orders.push((*slot, order.into_iter().map(|(_, i)| i).collect()));
+        let mut wishes: Vec<(f64, f64)> = vec![(0.0, 0.0); net.slots[*slot].items.len()];
+        near.iter().for_each(|(item, hop)| wishes[*item] = (wishes[*item].0 + height(hop), wishes[*item].1 + 1.0));
+        let mut order = net.slots[*slot].items.clone();
+        order.sort_by(|a, b| (wishes[*a].0 / wishes[*a].1).total_cmp(&(wishes[*b].0 / wishes[*b].1)));
+        orders.push((*slot, order));
     }
     orders.into_iter().for_each(|(slot, order)| net.slots[slot].items = order);
     net.layers[layer].sort_by(|a, b| keys[a].total_cmp(&keys[b]));
+    net.rank(layer, ranks);
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -240,7 +251,39 @@ impl Net {
 
 #[cfg(test)]
 mod tests {
-    use super::inversions;
+    use super::super::super::ink::Class;
+    use super::super::graph::{Block, End, Graph, Row, Wire};
+    use super::super::place::place;
+    use super::*;
+
+    /// A thousand boxes in forty columns, each with ten wires to boxes one to three columns on.
+    fn large() -> (Graph, Vec<usize>) {
+        const BOXES: usize = 1000;
+        let row = || Row { label: "side".into(), round: true, faces: Vec::new() };
+        let mut boxes: Vec<Block> = (0..BOXES).map(|i| Block { name: format!("b{i}"), rows: Vec::new() }).collect();
+        let mut end = |block: usize| {
+            boxes[block].rows.push(row());
+            End { block, row: boxes[block].rows.len() - 1 }
+        };
+        let pairs = (0..10 * BOXES).map(|i| (i % BOXES, i % BOXES + 25 + i * 7919 % 50)).filter(|p| p.1 < BOXES);
+        let wire =
+            |(a, b): (usize, usize)| Wire { ends: [end(a), end(b)], class: Class::Seat, count: 1, note: String::new() };
+        let wires: Vec<Wire> = pairs.map(wire).collect();
+        (Graph { contacts: wires.len(), boxes, wires }, (0..BOXES).map(|i| i / 25).collect())
+    }
+
+    #[test]
+    fn a_large_diagram_is_sorted_and_placed_without_overlaps() {
+        let (graph, columns) = large();
+        let mut net = Net::new(&graph, &columns);
+        let before = net.crossings();
+        sort(&mut net);
+        assert!(net.crossings() < before / 2, "{} of {before}", net.crossings());
+        let layout = place(&graph, &net);
+        for pair in net.layers.iter().flat_map(|l| l.windows(2)) {
+            assert!(layout.tops[pair[1]] > layout.tops[pair[0]] + layout.heights[pair[0]]);
+        }
+    }
 
     #[test]
     fn crossings_are_counted_as_by_hand() {

@@ -8,7 +8,6 @@ use super::super::spread::spread;
 use super::super::svg::{Point, bold_width, text_width};
 use super::graph::Graph;
 use super::order::{Hop, Net};
-use std::collections::BTreeMap;
 
 /// Of a row and of the name above the rows (px).
 pub(super) const ROW: f64 = 17.0;
@@ -35,13 +34,13 @@ pub(super) struct Layout {
     pub tops: Vec<f64>,
     pub heights: Vec<f64>,
     /// Per slot the middle of every item below the slot's upper border.
-    offsets: Vec<BTreeMap<usize, f64>>,
+    offsets: Vec<Vec<f64>>,
 }
 
 impl Layout {
     /// Height at which a wire passes.
     pub fn y(&self, hop: &Hop) -> f64 {
-        self.tops[hop.slot] + self.offsets[hop.slot][&hop.item]
+        self.tops[hop.slot] + self.offsets[hop.slot][hop.item]
     }
 
     /// The two corners of a slot.
@@ -65,11 +64,12 @@ pub(super) fn place(graph: &Graph, net: &Net) -> Layout {
 }
 
 /// The middles of a slot's items, and its height.
-fn measure(net: &Net, slot: usize) -> (BTreeMap<usize, f64>, f64) {
+fn measure(net: &Net, slot: usize) -> (Vec<f64>, f64) {
     let items = &net.slots[slot].items;
     let (head, step, foot) = if net.slots[slot].block.is_some() { (HEAD, ROW, FOOT) } else { (0.0, LANE, 0.0) };
-    let middles = items.iter().enumerate().map(|(i, item)| (*item, head + (i as f64 + 0.5) * step));
-    (middles.collect(), head + step * items.len() as f64 + foot)
+    let mut middles = vec![0.0; items.len()];
+    items.iter().enumerate().for_each(|(i, item)| middles[*item] = head + (i as f64 + 0.5) * step);
+    (middles, head + step * items.len() as f64 + foot)
 }
 
 fn columns(graph: &Graph, net: &Net) -> Vec<[f64; 2]> {
@@ -115,7 +115,7 @@ fn stack(net: &Net, layout: &mut Layout, column: &[usize]) {
 fn settle(net: &Net, layout: &mut Layout, layer: usize) {
     let column = &net.layers[layer];
     let wish = |slot: &usize| {
-        let pulls = net.near[*slot].iter().map(|(item, hop)| layout.y(hop) - layout.offsets[*slot][item]);
+        let pulls = net.near[*slot].iter().map(|(item, hop)| layout.y(hop) - layout.offsets[*slot][*item]);
         let (sum, count) = pulls.fold((0.0, 0.0), |(s, n), y| (s + y, n + 1.0));
         if count > 0.0 { (sum / count, count) } else { (layout.tops[*slot], FAINT) }
     };

@@ -65,8 +65,10 @@ pub fn svg(source: &Source, tree: &ErrorTree) -> String {
     loops.iter().for_each(|pair| sheet.dashed(&mut svg, *pair));
     sheet.draw(&mut svg);
     sheet.levels(&mut svg, |level| if level == 0 { "root".into() } else { format!("level {level}") });
-    let mut entries = ink::entries(&sheet.classes());
-    entries.push(Entry { sample: Sample::Dashed, word: "contact that would close a loop" });
+    let mut entries = ink::entries(&sheet.classes(), &sheet.rounds());
+    if !loops.is_empty() {
+        entries.push(Entry { sample: Sample::Dashed, word: "contact that would close a loop" });
+    }
     surround(&mut svg, &format!("Error tree: {name}"), tree.nodes.len() - shown, &entries);
     svg.finish(&format!("Error tree of {name}"))
 }
@@ -210,6 +212,11 @@ impl Sheet {
         classes.sort();
         classes.dedup();
         classes
+    }
+
+    /// Whether each surface is round.
+    fn rounds(&self) -> Vec<bool> {
+        self.nodes.iter().flat_map(|n| &n.rows).filter_map(|r| r.round).collect()
     }
 
     /// Edges, then boxes, circles and text over them.
