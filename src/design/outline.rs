@@ -117,7 +117,10 @@ impl Resolver {
         let placed = self.read_outline(name, body, names)?;
         let faults = self.outline_fault(&placed.outline);
         match faults {
-            None => Some(placed.outline),
+            None => {
+                self.warn_leaning(&placed);
+                Some(placed.outline)
+            }
             Some((fault, limit)) => {
                 self.report_outline(&placed, fault, limit);
                 None
@@ -262,6 +265,36 @@ impl Resolver {
             }
         }
         None
+    }
+
+    /// Warns of sides that are drawn along an axis and lean within tolerance, because each end has a dimension of its own.
+    fn warn_leaning(&mut self, placed: &Placed) {
+        let outline = &placed.outline;
+        let corners: Vec<&[Expr; 2]> =
+            std::iter::once(&outline.start).chain(outline.sides.iter().map(|s| &s.to)).collect();
+        // The last pair are the ends of the side that closes the outline, if there is one.
+        let pairs = corners.iter().zip(corners.iter().cycle().skip(1));
+        for (i, (from, to)) in pairs.enumerate() {
+            for (axis, letter) in ["x", "y"].into_iter().enumerate() {
+                let [Expr::Dim(a), Expr::Dim(b)] = [&from[axis], &to[axis]] else { continue };
+                let [a, b] = [a, b].map(|id| &self.dims[id.0 as usize]);
+                let straight = outline.sides.get(i).is_none_or(|s| s.path == OutlinePath::Line);
+                if !straight || a.name == b.name || a.range != b.range {
+                    continue;
+                }
+                let scale = self.file_scale(Quantity::Length, b.span);
+                let [low, high] = [b.range.low, b.range.high].map(|v| trim(v / scale));
+                let message = format!("outline `{}`: {} leans within tolerance", placed.name.text, placed.side(i));
+                let diagnostic = Diagnostic::warning("W0312", b.span, message)
+                    .label(format!("a dimension of its own, as the {letter} of the corner before"))
+                    .also(a.span, "drawn by itself")
+                    .help(format!(
+                        "write `let {letter}_{} = {low} .. {high}` above the outline, and its name in both places",
+                        i + 1
+                    ));
+                self.report(diagnostic);
+            }
+        }
     }
 
     fn report_outline(&mut self, placed: &Placed, fault: Fault, limit: Option<DimId>) {

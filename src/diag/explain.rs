@@ -30,6 +30,7 @@ const PAGES: &[(&str, &str)] = &[
     ("E0309", include_str!("explain/E0309.md")),
     ("W0310", include_str!("explain/W0310.md")),
     ("W0311", include_str!("explain/W0311.md")),
+    ("W0312", include_str!("explain/W0312.md")),
     ("E0401", include_str!("explain/E0401.md")),
     ("E0403", include_str!("explain/E0403.md")),
     ("E0405", include_str!("explain/E0405.md")),

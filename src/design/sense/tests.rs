@@ -151,7 +151,7 @@ fn coordinates_of_an_outline_have_the_sense_of_its_area() {
 #[test]
 fn a_groove_turned_about_an_axis_is_internal_where_it_deepens() {
     senses(
-        "outline groove {\n from (8, 4)\n line to (12, 4)\n line to (12, 6)\n line floor to (9 ±0.05, 6)\n line to (9 ±0.05, 4.5)\n line to (8, 4.5)\n}\n\
+        "outline groove {\n from (8, 4)\n line to (12, 4)\n line to (12, 6)\n line floor to (9 ±0.05, 6)\n line to (9.2 ±0.05, 4.5)\n line to (8, 4.5)\n}\n\
          add shaft = cylinder(d = 22 ±0.1, h = 30)\ncut ring = revolve(outline = groove)",
         &[("shaft.d", External)],
     );
