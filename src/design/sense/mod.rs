@@ -15,11 +15,15 @@ mod tests;
 
 use super::model::{DimId, Expr, Part, Sense, Shape};
 use super::scope::Resolver;
-use crate::diag::Diagnostic;
+use crate::diag::{Diagnostic, Span};
 use crate::iso;
 use crate::units::Range;
 use body::{Body, Leaf};
 use motion::{Motion, Nominal};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A dimension of a part, the same in all its pieces.
+type Place = ([u32; 3], usize);
 
 /// Ways in which one dimension is used.
 #[derive(Debug, Clone, Default)]
@@ -57,9 +61,7 @@ impl Resolver {
         for part in parts {
             Body::of(part).leaves.iter().for_each(|leaf| self.leaf_uses(leaf, &mut values, &mut uses));
         }
-        for part in parts {
-            self.motions(part, &mut values, &mut uses);
-        }
+        self.motions(parts, &mut values, &mut uses);
         for (id, uses) in uses.into_iter().enumerate() {
             self.settle(id, uses);
         }
@@ -84,21 +86,40 @@ impl Resolver {
         }
     }
 
-    /// Asks the part's boundary about its dimensions that signs alone do not settle.
-    fn motions(&self, part: &Part, values: &mut [f64], uses: &mut [Uses]) {
-        let body = Body::of(part);
-        let dims = body.leaves.iter().flat_map(|leaf| leaf.pose_dims().into_iter().chain(leaf.size_dims()));
-        let open: std::collections::BTreeSet<DimId> = dims.filter(|id| uses[id.0 as usize].unsettled()).collect();
-        if open.is_empty() {
-            return;
+    /// Asks the boundaries of parts about the dimensions that signs alone do not settle, once for all pieces of a part.
+    fn motions(&self, parts: &[Part], values: &mut [f64], uses: &mut [Uses]) {
+        let mut known: BTreeMap<&str, BTreeMap<Place, Motion>> = BTreeMap::new();
+        for part in parts {
+            let body = Body::of(part);
+            let dims = body.leaves.iter().flat_map(|leaf| leaf.pose_dims().into_iter().chain(leaf.size_dims()));
+            let open: BTreeSet<DimId> = dims.filter(|id| uses[id.0 as usize].unsettled()).collect();
+            let places = self.places(&open);
+            if !known.contains_key(part.name.as_str()) {
+                let nominal = Nominal::of(body, values, open.len());
+                let ask = |(place, id): (&Place, &DimId)| {
+                    (*place, nominal.motion(*id, self.dims[id.0 as usize].range.half_width(), values))
+                };
+                known.insert(&part.name, places.iter().zip(&open).map(ask).collect());
+            }
+            for (place, id) in places.iter().zip(&open) {
+                let Some(Motion { gained, lost }) = known[part.name.as_str()].get(place).cloned() else { continue };
+                let seen = &mut uses[id.0 as usize].motion;
+                seen.gained = seen.gained.take().or(gained);
+                seen.lost = seen.lost.take().or(lost);
+            }
         }
-        let nominal = Nominal::of(body, values, open.len());
-        for id in open {
-            let Motion { gained, lost } = nominal.motion(id, self.dims[id.0 as usize].range.half_width(), values);
-            let seen = &mut uses[id.0 as usize].motion;
-            seen.gained = seen.gained.take().or(gained);
-            seen.lost = seen.lost.take().or(lost);
-        }
+    }
+
+    /// What names a dimension of a part in all its pieces: where it is written, and which of the copies there it is.
+    fn places(&self, dims: &BTreeSet<DimId>) -> Vec<Place> {
+        let mut counts: BTreeMap<[u32; 3], usize> = BTreeMap::new();
+        let place = |id: &DimId| {
+            let Span { file, start, end } = self.dims[id.0 as usize].span;
+            let count = counts.entry([file, start, end]).or_default();
+            *count += 1;
+            ([file, start, end], *count)
+        };
+        dims.iter().map(place).collect()
     }
 
     /// Walks an expression with the sign of its derivative so far, counting the dimensions that `counts` lets through.

@@ -11,7 +11,7 @@ fn part(lines: &str) -> (Design, Vec<&'static str>) {
         "gonogo 1\nmaterial m {{\n kind = matt\n}}\npart p {{\n material = m\n{lines}\n}}\nassembly a {{\n root p\n}}\n\
          station s {{\n light room = room(patches = 1)\n}}\n"
     );
-    let loaded = load("x.gng", &|_| Ok(text.clone()), &[]);
+    let loaded = load("x.gng", &|_| Ok(text.to_string()), &[]);
     let codes = loaded.diagnostics.iter().map(|d| d.code).collect();
     (loaded.design.unwrap_or_else(|| panic!("{:#?}\n{text}", loaded.diagnostics)), codes)
 }
@@ -228,4 +228,20 @@ fn least_material_lies_inside_most_material() {
         }
     }
     assert!(both > 10_000 && band > 1_000, "{both} {band}");
+}
+
+#[test]
+fn all_pieces_of_a_part_have_the_same_senses() {
+    let text = "gonogo 1\nmaterial m {\n kind = matt\n}\nlet t = 10 ±0.1\npart p {\n material = m\n let floor = 3 ±0.1\n\
+                add slab = box(x = 40, y = 40, z = t)\n cut pocket = box(x = 20, y = 20, z = (t - floor)) at (0, 0, floor)\n\
+                cut bore = 2x cylinder(d = 2, h = through) at (15 ±0.1 each, 0) on line(pitch = 3)\n}\n\
+                assembly a {\n root p\n place b = 2x p on p.bore[1..2]\n place c = p on p\n place d = p on p\n}\n\
+                station s {\n light room = room(patches = 1)\n}\n";
+    let loaded = load("x.gng", &|_| Ok(text.to_string()), &[]);
+    let design = loaded.design.unwrap_or_else(|| panic!("{:#?}", loaded.diagnostics));
+    for piece in ["p", "b[1]", "b[2]", "c", "d"] {
+        assert_eq!(sense(&design, &format!("{piece}.floor")), External);
+        assert_eq!(sense(&design, &format!("{piece}.bore[2].at.x")), Neutral);
+    }
+    assert_eq!(sense(&design, "t"), External);
 }
