@@ -16,10 +16,7 @@ pub(super) fn layers(graph: &Graph, insertion: &Insertion) -> Vec<usize> {
         near[a].insert(b);
         near[b].insert(a);
     }
-    let mut stays = vec![0; n];
-    for (round, components) in insertion.rounds.iter().rev().zip(1..).map(|(r, i)| (i, r)) {
-        components.iter().for_each(|c| stays[*c] = round);
-    }
+    let stays = stays(n, insertion);
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by_key(|c| stays[*c]);
     let mut place = vec![0; n];
@@ -31,6 +28,22 @@ pub(super) fn layers(graph: &Graph, insertion: &Insertion) -> Vec<usize> {
     }
     draw_near(&order, &near, &mut layer);
     layer
+}
+
+/// How long each box stays, by the rounds of the whole and, in a group that leaves as one, by the group's own.
+fn stays(boxes: usize, insertion: &Insertion) -> Vec<(usize, usize)> {
+    let mut stays = vec![(0, 0); boxes];
+    let from_last = |rounds: &[Vec<usize>]| -> Vec<(usize, usize)> {
+        let numbered = rounds.iter().rev().zip(1..).flat_map(|(r, i)| r.iter().map(move |c| (*c, i)));
+        numbered.collect()
+    };
+    from_last(&insertion.rounds).into_iter().for_each(|(c, i)| stays[c] = (i, 0));
+    for group in &insertion.groups {
+        let own = insertion.rounds.len() - group.after.min(insertion.rounds.len());
+        group.members.iter().for_each(|c| stays[*c] = (own, 1));
+        from_last(&group.rounds).into_iter().for_each(|(c, i)| stays[c] = (own, 1 + i));
+    }
+    stays
 }
 
 /// What begins a chain of its own moves as far to the right as what stands on it allows.

@@ -251,3 +251,55 @@ fn surround(svg: &mut Svg, title: &str, unseen: &[&str]) {
         svg.text([low[0], high[1] + APART], Anchor::Start, NOTE, &note, &format!("fill=\"{GREY}\""));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assembly::sample::plate;
+    use nalgebra::Isometry3;
+
+    /// A disc of ø40 × 20: what is seen is the whole upper rim, half of the lower one, and two sides.
+    #[test]
+    fn a_cylinder_shows_its_rims_and_two_sides() {
+        let (radius, height) = (20.0, 20.0);
+        let solid = plate("disc", height, 2.0 * radius, &[]);
+        let projection = Projection::default();
+        let item = Item { name: "disc", solid: &solid, pose: Isometry3::identity() };
+        let lines = lines::lines(&item, &projection);
+        let covers = Covers::new(triangles(&item, &projection));
+        let page = Page { scale: 1.0 };
+        let runs: Vec<Run> = lines.iter().flat_map(|l| page.runs(l, &covers)).collect();
+        let drawn =
+            |weight| -> f64 { runs.iter().filter(|r| r.weight == weight).map(|r| page.length(&r.points)).sum() };
+        let [flat, up] = [projection.vector(&Vector3::z()).z, projection.vector(&Vector3::z()).y];
+        let half_rim: f64 = (0..10_000)
+            .map(|i| f64::from(i) / 10_000.0 * TAU / 2.0)
+            .fold(0.0, |sum, t| sum + radius * t.sin().hypot(flat * t.cos()) * TAU / 20_000.0);
+        let close = |a: f64, b: f64| (a - b).abs() < 0.01 * b;
+        assert!(close(drawn(Weight::Narrow), half_rim), "{} {half_rim}", drawn(Weight::Narrow));
+        let wide = 2.0 * half_rim + 2.0 * height * up;
+        assert!(close(drawn(Weight::Wide), wide), "{} {wide}", drawn(Weight::Wide));
+    }
+
+    /// The middle of a curve of a quarter turn at most is on the circle to 0.03 % of its radius.
+    #[test]
+    fn an_arc_ends_where_its_points_end() {
+        let circle = Circle { centre: Point3::origin(), axis: Vector3::z_axis() };
+        let turn = |k: usize| TAU * k as f64 / 64.0;
+        let points: Vec<Point3<f64>> = (0..=48).map(|k| Point3::new(turn(k).cos(), turn(k).sin(), 0.0)).collect();
+        let mut path = Path::default();
+        trace(&mut path, &Page { scale: 100.0 }, &Run { weight: Weight::Wide, points, circle: Some(circle) });
+        let mut svg = Svg::default();
+        svg.path(&path, "");
+        let reach = svg.extent().unwrap();
+        assert_eq!(reach.map(|c| c.map(f64::round)), [[-100.0, -100.0], [100.0, 100.0]]);
+        assert_eq!(svg.finish("").matches("d=\"M100 0c").count(), 1);
+    }
+
+    #[test]
+    fn straight_chains_keep_their_ends_only() {
+        let chain: Vec<Point> = (0..50).map(|i| [f64::from(i), 2.0 * f64::from(i)]).collect();
+        assert_eq!(simplified(&chain), [[0.0, 0.0], [49.0, 98.0]]);
+        assert_eq!(simplified(&[[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]]).len(), 3);
+    }
+}
