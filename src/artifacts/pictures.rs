@@ -61,7 +61,7 @@ fn file(stem: &str, ending: &str, text: String) -> File {
     (format!("{stem}.{ending}"), text.into_bytes())
 }
 
-/// `alignment_pin[2]` as `alignment_pin_2`: brackets mean something to shells.
+/// `alignment_pin[2]` as `alignment_pin.2`: brackets mean something to shells, and no name has a point.
 fn file_name(component: &str) -> String {
-    component.replace('[', "_").replace(']', "")
+    component.replace('[', ".").replace(']', "")
 }

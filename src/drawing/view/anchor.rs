@@ -90,10 +90,17 @@ impl Strips {
         (((y - self.low) / STRIP).max(0.0) as usize).min(self.lines.len().saturating_sub(1))
     }
 
-    /// Lines of other parts beside a point.
+    /// Lines of other parts beside a point: the most in its own strip and the two next to it, since a leader that grazes an
+    /// outline is as hard to read as one that crosses it.
     fn crossed(&self, part: usize, at: &Point, right: bool) -> usize {
-        let lines = &self.lines[self.strip(at[1])];
-        let cut = lines.partition_point(|l| l.0 < at[0]);
+        let own = self.strip(at[1]);
+        let near = own.saturating_sub(1)..=(own + 1).min(self.lines.len() - 1);
+        near.map(|strip| self.crossed_in(strip, part, at[0], right)).max().unwrap_or(0)
+    }
+
+    fn crossed_in(&self, strip: usize, part: usize, x: f64, right: bool) -> usize {
+        let lines = &self.lines[strip];
+        let cut = lines.partition_point(|l| l.0 < x);
         let beside = if right { &lines[cut..] } else { &lines[..cut] };
         beside.iter().filter(|l| l.1 != part).count()
     }
