@@ -161,6 +161,23 @@ proptest! {
     }
 
     #[test]
+    fn parts_of_any_shape_never_panic(
+        sides in proptest::collection::vec(side(), 1..9),
+        features in proptest::collection::vec(feature(), 1..6),
+        deep in 0usize..4,
+    ) {
+        let (open, close) = ("cut g = 2x group turn (0, 30 ±1, 0) on line(pitch = 3 ±0.1) {\n".repeat(deep), "}\n".repeat(deep));
+        let named = features.iter().enumerate().map(|(i, f)| f.replacen("NAME", &format!("f{i}"), 1));
+        let features = named.collect::<Vec<_>>().join("\n");
+        load(&format!(
+            "gonogo 1\nmaterial m {{\n kind = matt\n}}\npart p {{\n material = m\n let a = 5 ±0.1\n outline o {{\n from (a, 0)\n{}\n }}\n\
+             add base = box(x = 20, y = a, z = 10)\n{open}{features}\n{close}}}\nassembly s {{\n root p\n}}\n\
+             station b {{\n light r = room(patches = 1)\n}}\n",
+            sides.join("\n")
+        ));
+    }
+
+    #[test]
     fn mutated_specs_never_panic(spec in 0usize..4, at in 0.0f64..1.0, cut in 0usize..40, insert in word()) {
         let text = SPECS[spec];
         let start = text.floor_char_boundary((at * text.len() as f64) as usize);
@@ -251,4 +268,37 @@ fn word() -> impl Strategy<Value = String> {
         "é",
     ];
     proptest::sample::select(words.to_vec()).prop_map(str::to_string)
+}
+
+/// A line of an outline, on a coarse grid so that corners coincide and sides touch.
+fn side() -> impl Strategy<Value = String> {
+    let corner = proptest::sample::select(vec!["", " round 1", " round 2 ±0.5", " chamfer 1", " chamfer (a - 4)"]);
+    let bend = proptest::sample::select(vec!["", "", "", " radius 3 left", " radius a right", " radius 6 left long"]);
+    (0i32..6, -3i32..5, bend, corner, proptest::bool::ANY).prop_map(|(x, y, bend, corner, named)| {
+        let word = if bend.is_empty() { "line" } else { "arc" };
+        let x = if named { format!("(a * {x} / 2)") } else { (2 * x).to_string() };
+        format!("{word} to ({x}, {}){bend}{corner}", 2 * y)
+    })
+}
+
+/// A feature called NAME.
+fn feature() -> impl Strategy<Value = String> {
+    let shapes = [
+        "prism(outline = o, h = a)",
+        "prism(outline = o, h = through)",
+        "revolve(outline = o)",
+        "torus(d = 12, tube = a)",
+        "cylinder(d = a, h = 12, chamfer = 1 ±0.2)",
+        "cylinder(d = 4, h = through)",
+        "cone(d1 = a, d2 = 0, h = 6)",
+        "sphere(d = (2 * a))",
+        "hole(d = 3, h = a, tip = 118)",
+        "counterbore(d = 3, h = through, head_d = a, head_h = 2)",
+        "countersink(d = 3, h = 8, head_d = a)",
+    ];
+    let places = ["", " at (0, 0, a)", " at (1 ±0.1, 2, 10) turn (90, 0, 0)", " on circle(d = a)"];
+    let operations = ["add", "cut", "keep"];
+    let select = |list: &[&'static str]| proptest::sample::select(list.to_vec());
+    (select(&operations), select(&shapes), select(&places))
+        .prop_map(|(operation, shape, place)| format!("{operation} NAME = {shape}{place}"))
 }

@@ -4,8 +4,9 @@
 //! feature still shows the face that is named is known only on its solid, so that is not asked here.
 
 use super::assemble::Assembled;
-use super::model::{FacePath, Measure};
+use super::model::{FacePath, Feature, Measure, Shape};
 use super::scope::Resolver;
+use super::seat::copies;
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{self, Stmt};
@@ -66,18 +67,52 @@ impl Resolver {
     fn face(&mut self, face: &ast::Face, built: &Assembled) -> Option<FacePath> {
         let component = self.one_component(&face.component, built)?;
         let part = &built.parts[built.components[component].part];
-        let first = face.face.text.split(['.', '[']).next().unwrap_or_default();
-        if !part.features.iter().any(|f| f.name == first) {
-            let message = format!("part `{}` has no feature `{first}`", part.name);
-            let diagnostic = Diagnostic::error("E0201", face.face.span, message).label("unknown feature");
-            let names = part.features.iter().map(|f| f.name.as_str());
-            self.report(match nearest(first, names.clone()) {
-                Some(near) => diagnostic.help(format!("did you mean `{near}{}`?", &face.face.text[first.len()..])),
+        self.face_of(&format!("part `{}`", part.name), &part.features, &face.face.text, face.face.span)?;
+        Some(FacePath { component, face: face.face.text.clone(), span: face.span })
+    }
+
+    /// Follows a face's name through features and groups, as far as they are known: to the name of the side.
+    fn face_of(&mut self, owner: &str, features: &[Feature], path: &str, span: Span) -> Option<()> {
+        let (step, rest) = path.split_once('.').map_or((path, None), |(step, rest)| (step, Some(rest)));
+        let (name, index) = step.split_once('[').map_or((step, None), |(name, index)| (name, Some(index)));
+        let Some(feature) = features.iter().find(|f| f.name == name) else {
+            let message = format!("{owner} has no feature `{name}`");
+            let diagnostic = Diagnostic::error("E0201", span, message).label("unknown feature");
+            let names = features.iter().map(|f| f.name.as_str());
+            self.report(match nearest(name, names.clone()) {
+                Some(near) => diagnostic.help(format!("did you mean `{near}{}`?", &path[name.len()..])),
                 None => diagnostic.help(format!("its features: {}", names.collect::<Vec<_>>().join(", "))),
             });
             return None;
+        };
+        let count = feature.copies.len();
+        let number = index.map(|i| i.trim_end_matches(']').parse().unwrap_or(usize::MAX));
+        if number.is_some() != feature.patterned || !(1..=count).contains(&number.unwrap_or(1)) {
+            let label = if number.is_none() { "which one?" } else { "no such copy" };
+            self.no_such_copy(feature, label, span);
+            return None;
         }
-        Some(FacePath { component, face: face.face.text.clone(), span: face.span })
+        match (&feature.copies.first()?.shape, rest) {
+            (Shape::Group { features }, Some(rest)) => self.face_of(&format!("group `{name}`"), features, rest, span),
+            (_, Some(_)) => Some(()),
+            (shape, None) => {
+                let what = if matches!(shape, Shape::Group { .. }) { "a group" } else { "a feature" };
+                let message = format!("expected a face, `{name}` is {what}");
+                let help =
+                    "a face ends with its side: `slab.top`, `bore[2].side`, `block.+x`, `mount.screw.head.bottom`";
+                self.report(Diagnostic::error("E0203", span, message).label("its side is missing").help(help));
+                None
+            }
+        }
+    }
+
+    fn no_such_copy(&mut self, feature: &Feature, label: &str, span: Span) {
+        let name = &feature.name;
+        let (message, help) = match feature.patterned {
+            true => (format!("`{name}` has {}", copies(feature.copies.len())), format!("write `{name}[1]`")),
+            false => (format!("`{name}` is no pattern"), format!("write `{name}`")),
+        };
+        self.report(Diagnostic::error("E0505", span, message).label(label).help(help));
     }
 
     /// The one component that a segment such as `pin[2]` names.
