@@ -6,9 +6,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-/// A triangle covers a line when it is nearer to the viewer by more than this (mm): several times the chord height of the
-/// triangles, by which parts that fit closely may pass through each other.
+/// A triangle covers a line when it is nearer to the viewer by more than this (mm), or this share of the drawing if that is
+/// less: several times the chord height of the triangles, by which parts that fit closely may pass through each other.
 const CLEAR: f64 = 0.05;
+const CLEAR_SHARE: f64 = 3e-3;
 /// A triangle whose normal is this square to the view (mm² of shadow) covers nothing.
 const LEAST_SHADOW: f64 = 1e-9;
 /// Shares of a piece closer than this are one.
@@ -33,6 +34,8 @@ pub(super) struct Covers {
     cells: [usize; 2],
     /// Per cell the triangles that reach it.
     lists: Vec<Vec<u32>>,
+    /// A triangle covers what lies deeper by this (mm).
+    clear: f64,
 }
 
 impl Covers {
@@ -42,11 +45,12 @@ impl Covers {
         let points = || covers.iter().flat_map(|c| &c.corners);
         let low = [0, 1].map(|i| points().map(|p| p[i]).fold(f64::INFINITY, f64::min));
         let high = [0, 1].map(|i| points().map(|p| p[i]).fold(f64::NEG_INFINITY, f64::max));
-        let size = [0, 1].map(|i| (high[i] - low[i]).max(CLEAR));
+        let size = [0, 1].map(|i| (high[i] - low[i]).max(f64::MIN_POSITIVE));
         let wanted = (covers.len() as f64 / PER_CELL).sqrt().clamp(1.0, MOST_CELLS);
         let cell = size[0].max(size[1]) / wanted;
         let cells = size.map(|s| if s.is_finite() { (s / cell) as usize + 1 } else { 1 });
-        let mut grid = Covers { lists: vec![Vec::new(); cells[0] * cells[1]], covers, low, cell, cells };
+        let clear = CLEAR.min(CLEAR_SHARE * size[0].max(size[1]));
+        let mut grid = Covers { lists: vec![Vec::new(); cells[0] * cells[1]], covers, low, cell, cells, clear };
         grid.fill();
         grid
     }
@@ -68,7 +72,8 @@ impl Covers {
         }
         near.sort_unstable();
         near.dedup();
-        let mut hidden: Vec<[f64; 2]> = near.iter().filter_map(|c| self.covers[*c as usize].shadow(a, b)).collect();
+        let mut hidden: Vec<[f64; 2]> =
+            near.iter().filter_map(|c| self.covers[*c as usize].shadow(a, b, self.clear)).collect();
         hidden.sort_by(|x, y| x[0].total_cmp(&y[0]));
         rest(&hidden)
     }
@@ -109,15 +114,15 @@ impl Cover {
         })
     }
 
-    /// The stretch of the piece from `a` to `b` that lies in the shadow of this triangle.
-    fn shadow(&self, a: &Point3<f64>, b: &Point3<f64>) -> Option<[f64; 2]> {
+    /// The stretch of the piece from `a` to `b` that lies in the shadow of this triangle, deeper by `clear` mm.
+    fn shadow(&self, a: &Point3<f64>, b: &Point3<f64>, clear: f64) -> Option<[f64; 2]> {
         let mut stretch = [0.0, 1.0];
         for i in 0..3 {
             let (p, q) = (self.corners[i], self.corners[(i + 1) % 3]);
             let inside = |r: &Point3<f64>| (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
             clip(&mut stretch, inside(a), inside(b))?;
         }
-        let in_front = |r: &Point3<f64>| self.plane.dot(&Vector3::new(r.x, r.y, 1.0)) - r.z - CLEAR;
+        let in_front = |r: &Point3<f64>| self.plane.dot(&Vector3::new(r.x, r.y, 1.0)) - r.z - clear;
         clip(&mut stretch, in_front(a), in_front(b))?;
         Some(stretch)
     }
@@ -159,7 +164,8 @@ mod tests {
     fn a_line_above_is_whole_and_one_that_dives_is_cut_at_the_plane() {
         let above = roof().seen(&Point3::new(1.0, 1.0, 6.0), &Point3::new(3.0, 3.0, 6.0));
         assert_eq!(above, [[0.0, 1.0]]);
-        let dives = roof().seen(&Point3::new(1.0, 1.0, 10.0 - CLEAR), &Point3::new(3.0, 3.0, -CLEAR));
+        let clear = roof().clear;
+        let dives = roof().seen(&Point3::new(1.0, 1.0, 10.0 - clear), &Point3::new(3.0, 3.0, -clear));
         assert_eq!(dives.len(), 1);
         assert!((dives[0][1] - 0.5).abs() < 1e-12, "{dives:?}");
     }
@@ -181,7 +187,8 @@ mod tests {
         let covers = Covers::new(triangles.iter().copied());
         for i in 0..1000 {
             let p = corner(10_000 + 3 * i);
-            let alone = triangles.iter().filter_map(|t| Cover::new(*t)).all(|c| c.shadow(&p, &p).is_none());
+            let alone =
+                triangles.iter().filter_map(|t| Cover::new(*t)).all(|c| c.shadow(&p, &p, covers.clear).is_none());
             assert_eq!(sees(&covers, &p), alone, "{p}");
         }
     }

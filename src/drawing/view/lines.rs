@@ -15,9 +15,10 @@ use std::collections::BTreeMap;
 const SMOOTH: f64 = 0.9994;
 /// A normal this square to the view (cosine) still counts as seen: what is left after arithmetic.
 const GRAZING: f64 = 1e-7;
-/// Outlines are looked for just outside their face, where the chords of its own triangles cannot cover them (mm): twice the
-/// chord height of the triangles.
+/// Outlines are looked for just outside their face, where the chords of its own triangles cannot cover them: this far (mm), or
+/// this share of the part if that is less; twice the chord height of the triangles.
 const OUTSIDE: f64 = 0.02;
+const OUTSIDE_SHARE: f64 = 1.2e-3;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Weight {
@@ -119,6 +120,7 @@ fn outward(solid: &Solid, face: usize, at: &Point3<f64>) -> Vector3<f64> {
 /// Outlines of all curved faces.
 fn outlines(solid: &Solid, view: &View) -> Vec<Line> {
     let mesh = &solid.mesh;
+    let outside = OUTSIDE.min(OUTSIDE_SHARE * reach(mesh));
     let mut chains = Chains::default();
     for (t, corners) in mesh.triangles.iter().enumerate() {
         let facing = mesh.normals[t].map(|n| {
@@ -130,7 +132,14 @@ fn outlines(solid: &Solid, view: &View) -> Vec<Line> {
             chains.add(ends.into_iter().flatten().collect());
         }
     }
-    chains.finish(view)
+    chains.finish(view, outside)
+}
+
+/// The diagonal of the box round a part (mm).
+fn reach(mesh: &TriMesh) -> f64 {
+    let low = mesh.positions.iter().fold(Point3::from([f64::INFINITY; 3]), |low, p| low.inf(p));
+    let high = mesh.positions.iter().fold(Point3::from([f64::NEG_INFINITY; 3]), |high, p| high.sup(p));
+    (high - low).norm()
 }
 
 /// A point of an outline: the side of a triangle it crosses, in which face, and where.
@@ -170,7 +179,7 @@ impl Chains {
         }
     }
 
-    fn finish(self, view: &View) -> Vec<Line> {
+    fn finish(self, view: &View, outside: f64) -> Vec<Line> {
         let mut meeting: BTreeMap<(u32, u32, u32), Vec<usize>> = BTreeMap::new();
         for (i, piece) in self.pieces.iter().enumerate() {
             piece.iter().for_each(|end| meeting.entry(end.key).or_default().push(i));
@@ -184,7 +193,7 @@ impl Chains {
                 let back = self.follow(a, &meeting, &mut used);
                 let on = self.follow(b, &meeting, &mut used);
                 let chain: Vec<Crossing> = back.into_iter().rev().chain([a, b]).chain(on).collect();
-                lines.push(line(&chain, view));
+                lines.push(line(&chain, view, outside));
             }
         }
         lines
@@ -208,11 +217,11 @@ impl Chains {
     }
 }
 
-fn line(chain: &[Crossing], view: &View) -> Line {
+fn line(chain: &[Crossing], view: &View, outside: f64) -> Line {
     let aside = chain.iter().map(|c| {
         let normal = view.vector(&c.normal);
         let flat = Vector3::new(normal.x, normal.y, 0.0);
-        flat.try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vector3::zeros) * OUTSIDE
+        flat.try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vector3::zeros) * outside
     });
     Line {
         weight: Weight::Wide,
