@@ -9,14 +9,14 @@
 //! from the sign of their distance, which is not small there. No probe point, so no probe distance to choose.
 //! Merging of equal neighbours is implied: an arc with the same face on both sides is no edge.
 
-use super::csg::{Bounds, Leaf, Tree};
-use super::intersect::{Oblique, intersect, meet};
+use super::csg::{Bounds, Leaf, Side, Tree};
+use super::intersect::{Known, intersect};
 use super::locus::Locus;
 use super::tolerance;
+use super::trace::{Meeting, Shared, Tangled, trace};
 use crate::diag::Diagnostic;
 use nalgebra::{Point3, Vector3};
 use std::collections::{BTreeMap, HashMap};
-use std::f64::consts::TAU;
 
 /// A face that ends at an arc.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +34,7 @@ pub(super) struct Use {
 #[derive(Debug, Clone)]
 pub(super) struct Arc {
     pub curve: usize,
-    /// Parameters of the ends, the second the larger; a whole turn apart on a closed arc.
+    /// Parameters of the ends, the second the larger; a period apart on a closed arc.
     pub span: [f64; 2],
     /// Corners at the ends; `None` on a closed arc.
     pub ends: Option<[usize; 2]>,
@@ -60,7 +60,7 @@ pub(super) fn arrange(tree: &Tree) -> Result<Arrangement, Vec<Diagnostic>> {
             (!arc.uses.is_empty()).then_some(arc)
         }));
     }
-    let arcs = dissolve(arcs, corners.points.len());
+    let arcs = dissolve(arcs, corners.points.len(), &curves);
     Ok(Arrangement { curves: curves.into_iter().map(|c| c.locus).collect(), corners: corners.points, arcs })
 }
 
@@ -72,33 +72,52 @@ struct SharedCurve {
     /// Stretch of a line that lies near both its surfaces' leaves.
     reach: [f64; 2],
     bounds: Bounds,
+    /// Points on it where two of its surfaces touch, or have no normal.
+    nodes: Vec<Point3<f64>>,
 }
 
 /// Curves of all pairs of surfaces whose leaves come near each other.
 fn shared_curves(tree: &Tree) -> Result<Vec<SharedCurve>, Vec<Diagnostic>> {
     let mut pool = Pool::new(tree);
-    let material = tree.material().widened(tolerance::CULL);
-    let mut known: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
-    for (i, first) in tree.leaves.iter().enumerate() {
-        for second in &tree.leaves[i..] {
-            let both = first.bounds.common(&second.bounds.widened(tolerance::CULL));
-            let Some(both) = both.and_then(|b| b.common(&material)) else { continue };
-            for (a, b) in side_pairs(first, second) {
-                if let std::collections::btree_map::Entry::Vacant(entry) = known.entry((a, b)) {
-                    match intersect(&tree.surfaces[a], &tree.surfaces[b]) {
-                        Ok(loci) => entry.insert(loci.into_iter().map(|l| pool.intern(l, a, b)).collect()),
-                        Err(Oblique) if meet(tree, (a, b), [first, second], &both) => {
-                            return Err(vec![oblique(tree, first, second)]);
-                        }
-                        // Another pair of leaves on these surfaces may meet.
-                        Err(Oblique) => continue,
-                    };
-                }
-                known[&(a, b)].iter().for_each(|c| pool.curves[*c].extend(&both));
+    for (pair, meetings) in meetings(tree) {
+        let shared = match intersect(&tree.surfaces[pair.0], &tree.surfaces[pair.1]) {
+            Known::All(shared) => shared,
+            Known::Touching(touching) => {
+                let traced = trace(tree, [pair.0, pair.1], &meetings, &touching);
+                let Shared { mut loci, nodes } = traced.map_err(|Tangled| vec![tangled(tree, &meetings)])?;
+                loci.extend(touching);
+                Shared { loci, nodes }
             }
+        };
+        for locus in shared.loci {
+            let curve = pool.intern(locus, pair.0, pair.1);
+            let curve = &mut pool.curves[curve];
+            meetings.iter().for_each(|m| curve.extend(&m.bounds));
+            curve.nodes.extend(&shared.nodes);
         }
     }
     Ok(pool.curves)
+}
+
+/// Where leaves on each pair of surfaces come near each other, in the order in which the pairs are first met.
+fn meetings(tree: &Tree) -> Vec<((usize, usize), Vec<Meeting>)> {
+    let material = tree.material().widened(tolerance::CULL);
+    let mut place: HashMap<(usize, usize), usize> = HashMap::new();
+    let mut found: Vec<((usize, usize), Vec<Meeting>)> = Vec::new();
+    for (i, first) in tree.leaves.iter().enumerate() {
+        for (j, second) in tree.leaves.iter().enumerate().skip(i) {
+            let both = first.bounds.common(&second.bounds.widened(tolerance::CULL));
+            let Some(bounds) = both.and_then(|b| b.common(&material)) else { continue };
+            for pair in side_pairs(first, second) {
+                let at = *place.entry(pair).or_insert_with(|| {
+                    found.push((pair, Vec::new()));
+                    found.len() - 1
+                });
+                found[at].1.push(Meeting { leaves: [i, j], bounds });
+            }
+        }
+    }
+    found
 }
 
 fn side_pairs(first: &Leaf, second: &Leaf) -> Vec<(usize, usize)> {
@@ -106,16 +125,16 @@ fn side_pairs(first: &Leaf, second: &Leaf) -> Vec<(usize, usize)> {
     pairs.filter(|(a, b)| a != b).map(|(a, b)| (a.min(b), a.max(b))).collect()
 }
 
-fn oblique(tree: &Tree, first: &Leaf, second: &Leaf) -> Diagnostic {
-    let span = |leaf: &Leaf| tree.part.features[leaf.feature].span;
+fn tangled(tree: &Tree, meetings: &[Meeting]) -> Diagnostic {
+    let [first, second] = meetings.first().map_or([0, 0], |m| m.leaves).map(|l| &tree.leaves[l]);
     let message = format!(
-        "`{}` and `{}` of `{}` meet in a curve that is neither a line nor a circle",
+        "`{}` and `{}` of `{}` almost touch: their curve cannot be told",
         first.name, second.name, tree.part.name
     );
-    Diagnostic::error("E0406", span(second), message)
-        .label("set obliquely to the other")
-        .also(span(first), "this one")
-        .note("axes may be parallel, or square to a flat face; cones and spheres may share an axis with what they meet")
+    Diagnostic::error("E0406", second.span, message)
+        .label("runs along the other closer than can be resolved")
+        .also(first.span, "this one")
+        .note("let them touch exactly, overlap clearly, or keep them apart")
 }
 
 /// Interns curves by their parameters.
@@ -156,7 +175,13 @@ impl Pool {
     fn add(&mut self, locus: Locus, key: f64) -> usize {
         self.index.entry(key.floor() as i64).or_default().push(self.curves.len());
         let reach = [f64::INFINITY, f64::NEG_INFINITY];
-        self.curves.push(SharedCurve { locus, surfaces: Vec::new(), reach, bounds: Bounds::empty() });
+        self.curves.push(SharedCurve {
+            locus,
+            surfaces: Vec::new(),
+            reach,
+            bounds: Bounds::empty(),
+            nodes: Vec::new(),
+        });
         self.curves.len() - 1
     }
 
@@ -165,6 +190,9 @@ impl Pool {
         let distance = match locus {
             Locus::Line { point, along } => super::surface::radial(point, along, &self.reference).norm(),
             Locus::Circle { centre, radius, .. } => (centre - self.reference).norm() + radius,
+            Locus::Ellipse { centre, .. } => (centre - self.reference).norm(),
+            // The same curve may be traced from another start, so all traced curves share a bin.
+            Locus::Traced(_) => 0.0,
         };
         distance / BIN
     }
@@ -180,38 +208,47 @@ impl SharedCurve {
                 self.reach = [self.reach[0].min(a), self.reach[1].max(b)];
                 [a, b].iter().for_each(|t| self.bounds.include(&(point + along.into_inner() * *t)));
             }
-            Locus::Circle { centre, axis, radius, .. } => {
-                let half = axis.map(|c| radius * (1.0 - c * c).max(0.0).sqrt());
-                let round = Bounds { low: centre - half, high: centre + half };
-                if round.common(&near).is_some() {
-                    self.reach = [0.0, TAU];
-                    self.bounds = round;
-                }
+            other => {
+                let Some(round) = other.bounds().filter(|b| b.common(&near).is_some()) else { return };
+                self.reach = [0.0, other.period().unwrap_or(f64::INFINITY)];
+                self.bounds = round;
             }
         }
     }
 
-    /// Corners on the curve in the order of their parameters: where the sides of leaves cross it.
+    /// Corners on the curve in the order of their parameters: where the sides of leaves cross it, and its nodes.
     fn stops(&self, tree: &Tree, corners: &mut Corners) -> Vec<(f64, usize)> {
         let mut stops: Vec<(f64, usize)> = Vec::new();
         if self.reach[0] > self.reach[1] {
             return stops;
         }
         let near = self.bounds.widened(tolerance::CULL);
+        let mut stop = |p: Point3<f64>, stops: &mut Vec<(f64, usize)>| {
+            let corner = corners.intern(p);
+            stops.push((self.locus.parameter(&corners.points[corner]), corner));
+        };
+        let mut known: BTreeMap<usize, Vec<Point3<f64>>> = BTreeMap::new();
         for leaf in tree.leaves.iter().filter(|l| l.bounds.common(&near).is_some()) {
             for side in leaf.sides.iter().filter(|s| self.surfaces.binary_search(&s.surface).is_err()) {
-                for t in self.locus.crossings(&tree.surfaces[side.surface]).unwrap_or_default() {
-                    let p = self.locus.at(t);
-                    if near.holds(&p) && tree.near_leaf(leaf, &p, side.surface) {
-                        let corner = corners.intern(p);
-                        stops.push((self.locus.parameter(&corners.points[corner]), corner));
+                let points = known.entry(side.surface).or_insert_with(|| {
+                    let crossings = self.locus.crossings(&tree.surfaces[side.surface]).unwrap_or_default();
+                    crossings.into_iter().map(|t| self.locus.at(t)).filter(|p| near.holds(p)).collect()
+                });
+                for p in points {
+                    if tree.near_leaf(leaf, p, Some(side.surface), tolerance::WELD) {
+                        stop(*p, &mut stops);
                     }
                 }
             }
         }
+        for node in &self.nodes {
+            if (self.locus.at(self.locus.parameter(node)) - node).norm() < tolerance::WELD {
+                stop(*node, &mut stops);
+            }
+        }
         stops.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         stops.dedup_by_key(|s| s.1);
-        if self.locus.closed() && stops.len() > 1 && stops[0].1 == stops[stops.len() - 1].1 {
+        if self.locus.period().is_some() && stops.len() > 1 && stops[0].1 == stops[stops.len() - 1].1 {
             stops.pop();
         }
         stops
@@ -220,16 +257,15 @@ impl SharedCurve {
     /// Arcs between neighbouring stops; a closed curve without a stop is one arc.
     fn arcs(&self, curve: usize, stops: &[(f64, usize)]) -> Vec<Arc> {
         let arc = |span, ends| Arc { curve, span, ends, uses: Vec::new() };
-        if self.reach[0] > self.reach[1] || (!self.locus.closed() && stops.is_empty()) {
-            return Vec::new();
-        }
-        let Some(&(start, corner)) = stops.first() else { return vec![arc([0.0, TAU], None)] };
+        let Some(period) = self.locus.period().filter(|_| self.reach[0] <= self.reach[1]) else {
+            let between = |w: &[(f64, usize)]| arc([w[0].0, w[1].0], Some([w[0].1, w[1].1]));
+            return stops.windows(2).map(between).collect();
+        };
+        let Some(&(start, corner)) = stops.first() else { return vec![arc([0.0, period], None)] };
         let between = |w: &[(f64, usize)]| arc([w[0].0, w[1].0], Some([w[0].1, w[1].1]));
         let mut arcs: Vec<Arc> = stops.windows(2).map(between).collect();
-        if self.locus.closed() {
-            let &(last, from) = stops.last().unwrap_or(&(start, corner));
-            arcs.push(arc([last, start + TAU], Some([from, corner])));
-        }
+        let &(last, from) = stops.last().unwrap_or(&(start, corner));
+        arcs.push(arc([last, start + period], Some([from, corner])));
         arcs
     }
 }
@@ -268,23 +304,36 @@ impl Corners {
 /// A leaf that holds the middle of an arc, as far as the surfaces through the curve allow.
 struct Nearby {
     leaf: usize,
-    /// Its sides through the curve: (place in the curve's list, sense).
-    through: Vec<(usize, f64)>,
+    /// Per side of the leaf: known to be inside or not, or through the curve (place in the curve's list, sense).
+    sides: Vec<At>,
+}
+
+#[derive(Clone, Copy)]
+enum At {
+    Known(bool),
+    Through(usize, f64),
 }
 
 /// The faces that end at the arc: sheets that bound the solid on one side of it only, or with different senses.
 fn uses(tree: &Tree, curve: &SharedCurve, arc: &Arc) -> Vec<Use> {
     let t = (arc.span[0] + arc.span[1]) / 2.0;
     let (middle, tangent) = (curve.locus.at(t), curve.locus.tangent(t));
-    let leaves: Vec<Nearby> = (0..tree.leaves.len()).filter_map(|l| nearby(tree, curve, l, &middle)).collect();
-    if leaves.is_empty() {
+    // The curve of a cone, beyond its apex, is on none of its surfaces.
+    let surfaces: Vec<usize> = curve
+        .surfaces
+        .iter()
+        .copied()
+        .filter(|s| tree.surfaces[*s].distance(&middle).abs() < tolerance::WELD)
+        .collect();
+    let through = Through { tree, surfaces: &surfaces, middle };
+    let leaves: Vec<Nearby> = (0..tree.leaves.len()).filter_map(|l| through.nearby(l)).collect();
+    if leaves.is_empty() || surfaces.len() < 2 {
         return Vec::new();
     }
     let mut uses = Vec::new();
-    for (place, &surface) in curve.surfaces.iter().enumerate() {
-        let normal = tree.surfaces[surface].normal_at(&middle);
-        let left = normal.cross(&tangent);
-        let sheets = [left, -left].map(|step| sheet(tree, curve, &leaves, place, &middle, &step));
+    for (place, &surface) in surfaces.iter().enumerate() {
+        let left = tree.surfaces[surface].normal_at(&middle).cross(&tangent);
+        let sheets = [left, -left].map(|step| through.sheet(&leaves, place, &step));
         if sheets[0].map(|s| s.0) == sheets[1].map(|s| s.0) {
             continue;
         }
@@ -297,65 +346,68 @@ fn uses(tree: &Tree, curve: &SharedCurve, arc: &Arc) -> Vec<Use> {
     uses
 }
 
-fn nearby(tree: &Tree, curve: &SharedCurve, leaf: usize, p: &Point3<f64>) -> Option<Nearby> {
-    if !tree.leaves[leaf].bounds.widened(tolerance::CULL).holds(p) {
-        return None;
-    }
-    let mut through = Vec::new();
-    for side in &tree.leaves[leaf].sides {
-        match curve.surfaces.binary_search(&side.surface) {
-            Ok(place) => through.push((place, side.sense)),
-            Err(_) if tree.surfaces[side.surface].distance(p) * side.sense > 0.0 => return None,
-            Err(_) => {}
+/// The middle of an arc and the surfaces through it.
+struct Through<'a> {
+    tree: &'a Tree<'a>,
+    surfaces: &'a [usize],
+    middle: Point3<f64>,
+}
+
+impl Through<'_> {
+    fn nearby(&self, leaf: usize) -> Option<Nearby> {
+        let Leaf { bounds, sides, formula, .. } = &self.tree.leaves[leaf];
+        if !bounds.widened(tolerance::CULL).holds(&self.middle) {
+            return None;
         }
+        let at = |side: &Side| match self.surfaces.binary_search(&side.surface) {
+            Ok(place) => At::Through(place, side.sense),
+            Err(_) => At::Known(self.tree.surfaces[side.surface].distance(&self.middle) * side.sense <= 0.0),
+        };
+        let sides: Vec<At> = sides.iter().map(at).collect();
+        let may = formula.may_hold(&|i| match sides[i] {
+            At::Known(inside) => Some(inside),
+            At::Through(..) => None,
+        });
+        may.then_some(Nearby { leaf, sides })
     }
-    Some(Nearby { leaf, through })
-}
 
-/// Whether the sheet of the curve's surface `place`, a step from the arc along `step`, bounds the solid: with its
-/// outward sense and the first leaf whose side it is.
-fn sheet(
-    tree: &Tree,
-    curve: &SharedCurve,
-    leaves: &[Nearby],
-    place: usize,
-    middle: &Point3<f64>,
-    step: &Vector3<f64>,
-) -> Option<(bool, usize)> {
-    let signs: Vec<f64> =
-        (0..curve.surfaces.len()).map(|other| sign(tree, curve, place, other, middle, step)).collect();
-    let holds = |near: &Nearby, side: f64| {
-        near.through.iter().all(|&(at, sense)| sense * if at == place { side } else { signs[at] } < 0.0)
-    };
-    let inside = |side: f64| tree.inside(leaves.iter().filter(|l| holds(l, side)).map(|l| l.leaf));
-    let (below, above) = (inside(-1.0), inside(1.0));
-    if below == above {
-        return None;
+    /// Whether the sheet of the surface at `place`, a step from the arc along `step`, bounds the solid: with its outward
+    /// sense and the first leaf whose side it is.
+    fn sheet(&self, leaves: &[Nearby], place: usize, step: &Vector3<f64>) -> Option<(bool, usize)> {
+        let signs: Vec<f64> = (0..self.surfaces.len()).map(|other| self.sign(place, other, step)).collect();
+        let holds = |near: &Nearby, side: f64| {
+            self.tree.leaves[near.leaf].formula.holds(&|i| match near.sides[i] {
+                At::Known(inside) => inside,
+                At::Through(at, sense) => sense * if at == place { side } else { signs[at] } < 0.0,
+            })
+        };
+        let held = |side: f64| -> Vec<bool> { leaves.iter().map(|l| holds(l, side)).collect() };
+        let sides = [held(-1.0), held(1.0)];
+        let inside = |held: &[bool]| {
+            self.tree.inside(leaves.iter().zip(held).filter(|(_, held)| **held).map(|(near, _)| near.leaf))
+        };
+        let (below, above) = (inside(&sides[0]), inside(&sides[1]));
+        if below == above {
+            return None;
+        }
+        let changes = (0..leaves.len()).find(|l| sides[0][*l] != sides[1][*l]);
+        changes.map(|l| (below, leaves[l].leaf))
     }
-    let is_side =
-        |near: &&Nearby| near.through.iter().any(|(at, _)| *at == place) && (holds(near, -1.0) || holds(near, 1.0));
-    leaves.iter().find(is_side).map(|owner| (below, owner.leaf))
-}
 
-/// Sign of the distance from surface `other` after a step along `step` on surface `place`.
-fn sign(
-    tree: &Tree,
-    curve: &SharedCurve,
-    place: usize,
-    other: usize,
-    middle: &Point3<f64>,
-    step: &Vector3<f64>,
-) -> f64 {
-    if place == other {
-        return 0.0;
+    /// Sign of the distance from the surface at `other` after a step along `step` on the surface at `place`.
+    fn sign(&self, place: usize, other: usize, step: &Vector3<f64>) -> f64 {
+        if place == other {
+            return 0.0;
+        }
+        let [on, to] = [place, other].map(|p| &self.tree.surfaces[self.surfaces[p]]);
+        let normal = to.normal_at(&self.middle);
+        let first = normal.dot(step);
+        if first.abs() > TANGENT {
+            return first.signum();
+        }
+        let middle = &self.middle;
+        (to.bend(middle, step) - normal.dot(&on.normal_at(middle)) * on.bend(middle, step)).signum()
     }
-    let (on, to) = (&tree.surfaces[curve.surfaces[place]], &tree.surfaces[curve.surfaces[other]]);
-    let normal = to.normal_at(middle);
-    let first = normal.dot(step);
-    if first.abs() > TANGENT {
-        return first.signum();
-    }
-    (to.bend(middle, step) - normal.dot(&on.normal_at(middle)) * on.bend(middle, step)).signum()
 }
 
 /// Surfaces that meet at a smaller angle (rad) touch along their curve: the angle of a cylinder's side and a flat that
@@ -363,14 +415,14 @@ fn sign(
 const TANGENT: f64 = 2e-4;
 
 /// Joins arcs of one curve at corners where nothing else ends.
-fn dissolve(arcs: Vec<Arc>, corners: usize) -> Vec<Arc> {
+fn dissolve(arcs: Vec<Arc>, corners: usize, curves: &[SharedCurve]) -> Vec<Arc> {
     let mut degree = vec![0_u32; corners];
     arcs.iter().flat_map(|a| a.ends).flatten().for_each(|c| degree[c] += 1);
     let mut merged: Vec<Arc> = Vec::with_capacity(arcs.len());
     let mut first_of_curve = 0;
     for arc in arcs {
         if merged.last().is_none_or(|last| last.curve != arc.curve) {
-            close_up(&mut merged, first_of_curve, &degree);
+            close_up(&mut merged, first_of_curve, &degree, curves);
             first_of_curve = merged.len();
         }
         match merged.last_mut() {
@@ -378,12 +430,12 @@ fn dissolve(arcs: Vec<Arc>, corners: usize) -> Vec<Arc> {
             _ => merged.push(arc),
         }
     }
-    close_up(&mut merged, first_of_curve, &degree);
+    close_up(&mut merged, first_of_curve, &degree, curves);
     merged
 }
 
 /// Joins the last arc of a closed curve to its first, and makes a closed arc of one that meets itself.
-fn close_up(arcs: &mut Vec<Arc>, first: usize, degree: &[u32]) {
+fn close_up(arcs: &mut Vec<Arc>, first: usize, degree: &[u32], curves: &[SharedCurve]) {
     if arcs.len() > first + 1 && joins(&arcs[arcs.len() - 1], &arcs[first], degree) {
         let head = arcs.remove(first);
         if let Some(last) = arcs.last_mut() {
@@ -393,7 +445,7 @@ fn close_up(arcs: &mut Vec<Arc>, first: usize, degree: &[u32]) {
     if let Some(only) = arcs.get_mut(first)
         && only.ends.is_some_and(|[a, b]| a == b && degree[a] == 2)
     {
-        only.span = [0.0, TAU];
+        only.span = [0.0, curves[only.curve].locus.period().unwrap_or(0.0)];
         only.ends = None;
     }
 }

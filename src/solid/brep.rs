@@ -5,12 +5,12 @@
 //! body. Nothing is repaired.
 
 use super::arrange::{Arc, Arrangement, Use};
-use super::csg::Tree;
+use super::csg::{Leaf, Side, Tree};
 use super::measure::{self, Flux, Run};
-use super::ring::{Ring, offsets};
+use super::ring::{Ring, lay_out, offsets};
 use super::{Edge, Face, Quality, Solid, Surface, TriMesh};
 use crate::diag::Diagnostic;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Unit, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -21,16 +21,18 @@ type Sheet = (usize, bool);
 type Loop = Vec<(usize, bool)>;
 
 /// Traces, groups, measures and checks.
-pub(super) fn build(tree: &Tree, mut arrangement: Arrangement, quality: &Quality) -> Result<Solid, Faults> {
+pub(super) fn build(tree: &mut Tree, mut arrangement: Arrangement, quality: &Quality) -> Result<Solid, Faults> {
     check_manifold(tree, &arrangement)?;
     let vertices = compact(&mut arrangement);
     let mut edges: Vec<Edge> = arrangement.arcs.iter().map(|a| edge(&arrangement, a, &vertices, quality)).collect();
+    turn_spheres(tree, &arrangement, &edges);
+    let tree = &*tree;
     let mut drafts = Vec::new();
     for (sheet, halves) in sheets(&arrangement.arcs) {
         let loops = trace(tree, &arrangement, sheet, &halves)?;
         drafts.extend(group(tree, sheet, loops, &edges, vertices.len())?);
     }
-    drafts.extend(whole_spheres(tree, &drafts));
+    drafts.extend(whole_surfaces(tree, &drafts));
     if drafts.is_empty() {
         return Err(vec![empty(tree)]);
     }
@@ -51,6 +53,9 @@ pub(super) fn build(tree: &Tree, mut arrangement: Arrangement, quality: &Quality
 struct Draft {
     sheet: Sheet,
     loops: Vec<Loop>,
+    /// Euler's number of the face: 2 less its loops where it could lie in a plane, 0 less them where it goes round both ways
+    /// of a torus.
+    euler: i64,
     /// Leaf and side that name it.
     owner: (usize, usize),
 }
@@ -98,7 +103,7 @@ fn non_manifold(tree: &Tree, arrangement: &Arrangement, arc: &Arc) -> Diagnostic
     let names: Vec<String> = leaves.iter().map(|l| format!("`{}`", tree.leaves[*l].name)).collect();
     let p = arrangement.curves[arc.curve].at((arc.span[0] + arc.span[1]) / 2.0);
     let message = format!("{} of `{}` touch along a line only", names.join(" and "), tree.part.name);
-    let spans = leaves.iter().map(|l| tree.part.features[tree.leaves[*l].feature].span);
+    let spans = leaves.iter().map(|l| tree.leaves[*l].span);
     let last = spans.clone().next_back().unwrap_or(tree.part.span);
     let fault = Diagnostic::error("E0407", last, message)
         .note(format!("near ({:.3}, {:.3}, {:.3}) mm; let them overlap or keep them apart", p.x, p.y, p.z));
@@ -129,7 +134,7 @@ fn edge(arrangement: &Arrangement, arc: &Arc, vertices: &[Point3<f64>], quality:
         None => samples[last] = samples[0],
     }
     let ends = arc.ends.map_or([None, None], |e| e.map(Some));
-    Edge { curve: locus.curve(), ends, faces: [usize::MAX; 2], samples }
+    Edge { curve: locus.curve(arc.span), ends, faces: [usize::MAX; 2], samples }
 }
 
 /// Half-edges by sheet.
@@ -212,15 +217,18 @@ fn sharpest(
 fn group(tree: &Tree, sheet: Sheet, loops: Vec<Loop>, edges: &[Edge], corners: usize) -> Result<Vec<Draft>, Faults> {
     let surface = &tree.surfaces[sheet.0];
     let offsets = offsets(corners, edges);
-    let rings: Vec<Ring> = loops.iter().map(|l| Ring::new(surface, sheet.1, edges, &offsets, l)).collect();
-    // The last place stands for the south pole or apex.
+    let Some((_, rings)) = lay_out(surface, sheet.1, edges, &offsets, &loops) else {
+        return Err(vec![internal(tree, "an edge goes round a torus both ways at once")]);
+    };
+    // The last place stands for the south pole or apex, and for what goes round a torus both ways.
     let south = rings.len();
+    let bottomless = surface.poles()[0].is_some() || surface.period_across().is_some();
     let mut parent: Vec<usize> = (0..=south).collect();
     for (i, ring) in rings.iter().enumerate().filter(|(_, r)| !r.is_outer() && r.winding != 1) {
         let low = ring.lowest();
         let hit = |j: usize| rings[j].below(low).map(|v| (v, j));
         let below = (0..rings.len()).filter(|j| *j != i).filter_map(hit).max_by(|a, b| a.0.total_cmp(&b.0));
-        if below.is_none() && !matches!(surface, Surface::Cone { .. } | Surface::Sphere { .. }) {
+        if below.is_none() && !bottomless {
             return Err(vec![internal(tree, "a hole lies in no face")]);
         }
         let (a, b) = (root(&parent, i), root(&parent, below.map_or(south, |b| b.1)));
@@ -243,12 +251,14 @@ fn draft(tree: &Tree, sheet: Sheet, members: &[usize], rings: &[Ring], loops: &[
     let winding: i32 = members.iter().map(|i| rings[*i].winding).sum();
     let outers = members.iter().filter(|i| rings[**i].is_outer()).count();
     let winds = members.iter().filter(|i| rings[**i].winding != 0).count();
-    let sphere = matches!(surface, Surface::Sphere { .. });
+    let [south, north] = surface.poles().map(|p| p.is_some());
+    let torus = surface.period_across().is_some();
     let sound = match (outers, winds, winding) {
         (1, 0, _) => true,
         (0, 2, 0) => true,
-        (0, 1, -1) => sphere || matches!(surface, Surface::Cone { .. }),
-        (0, 1, 1) | (0, 0, _) => sphere,
+        (0, 1, -1) => south,
+        (0, 1, 1) => north,
+        (0, 0, _) => south && north || torus,
         _ => false,
     };
     if !sound {
@@ -256,31 +266,66 @@ fn draft(tree: &Tree, sheet: Sheet, members: &[usize], rings: &[Ring], loops: &[
     }
     let mut order = members.to_vec();
     order.sort_by_key(|i| (!rings[*i].is_outer() && rings[*i].winding != 1, *i));
-    let loops = order.iter().map(|i| loops[*i].clone()).collect();
-    Ok(Draft { sheet, loops, owner: (0, 0) })
+    let loops: Vec<Loop> = order.iter().map(|i| loops[*i].clone()).collect();
+    let euler = if torus && outers + winds == 0 { 0 } else { 2 } - loops.len() as i64;
+    Ok(Draft { sheet, loops, euler, owner: (0, 0) })
 }
 
-/// Spheres that nothing cuts have no edge to be found by: one point decides.
-fn whole_spheres(tree: &Tree, drafts: &[Draft]) -> Vec<Draft> {
+/// Spheres and tori that nothing cuts have no edge to be found by: one point decides.
+fn whole_surfaces(tree: &Tree, drafts: &[Draft]) -> Vec<Draft> {
     let whole = |(i, surface): (usize, &Surface)| {
-        let Surface::Sphere { centre, radius, .. } = surface else { return None };
+        let p = match surface {
+            Surface::Sphere { centre, radius, .. } => centre + Vector3::new(0.48, 0.6, 0.64) * *radius,
+            Surface::Torus { major, minor, .. } if major > minor => surface.at([0.37 * minor, 0.53 * major]),
+            _ => return None,
+        };
         if drafts.iter().any(|d| d.sheet.0 == i) {
             return None;
         }
-        let p = centre + Vector3::new(0.48, 0.6, 0.64) * *radius;
         let holds = |leaf: usize, side: f64| {
-            tree.leaves[leaf].sides.iter().all(|s| {
+            let Leaf { sides, formula, .. } = &tree.leaves[leaf];
+            formula.holds(&|k| {
+                let s = &sides[k];
                 let d = if s.surface == i { side } else { tree.surfaces[s.surface].distance(&p) };
                 d * s.sense < 0.0
             })
         };
         let inside = |side: f64| tree.inside((0..tree.leaves.len()).filter(|l| holds(*l, side)));
         let (below, above) = (inside(-1.0), inside(1.0));
-        let draft = Draft { sheet: (i, below), loops: Vec::new(), owner: (0, 0) };
+        let euler = if matches!(surface, Surface::Torus { .. }) { 0 } else { 2 };
+        let draft = Draft { sheet: (i, below), loops: Vec::new(), euler, owner: (0, 0) };
         (below != above).then_some(draft)
     };
     tree.surfaces.iter().enumerate().filter_map(whole).collect()
 }
+
+/// Directions that the axis of a sphere's chart is chosen from.
+const AXES: usize = 48;
+
+/// Turns the chart of every sphere so that its poles lie as far from its edges as can be.
+fn turn_spheres(tree: &mut Tree, arrangement: &Arrangement, edges: &[Edge]) {
+    for (i, surface) in tree.surfaces.iter_mut().enumerate() {
+        let Surface::Sphere { centre, axis, .. } = surface else { continue };
+        let own = arrangement.arcs.iter().zip(edges).filter(|(arc, _)| arc.uses.iter().any(|u| u.surface == i));
+        let points: Vec<Vector3<f64>> = own.flat_map(|(_, e)| &e.samples).map(|p| (p - *centre).normalize()).collect();
+        let nearest = |d: &Vector3<f64>| points.iter().map(|p| p.dot(d).abs()).fold(0.0, f64::max);
+        // The axis it has is kept unless another is clearly better.
+        let mut best = (nearest(axis) - 0.05, *axis);
+        for k in 0..AXES {
+            let (z, turn) = ((k as f64 + 0.5) / AXES as f64, k as f64 * GOLDEN_ANGLE);
+            let flat = (1.0 - z * z).sqrt();
+            let d = Unit::new_normalize(Vector3::new(flat * turn.cos(), flat * turn.sin(), z));
+            let near = nearest(&d);
+            if near < best.0 {
+                best = (near, d);
+            }
+        }
+        *axis = best.1;
+    }
+}
+
+/// Turn from one direction to the next on a spiral that covers a sphere evenly (rad).
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
 /// Leaf and side that a face is named after: the first in source order.
 fn owner(tree: &Tree, arrangement: &Arrangement, draft: &Draft) -> (usize, usize) {
@@ -288,7 +333,8 @@ fn owner(tree: &Tree, arrangement: &Arrangement, draft: &Draft) -> (usize, usize
         let mine = |u: &&Use| (u.surface, u.outward) == draft.sheet && u.forward == forward;
         arrangement.arcs[arc].uses.iter().find(mine).map(|u| u.leaf)
     };
-    let side = |leaf: usize| tree.leaves[leaf].sides.iter().position(|s| s.surface == draft.sheet.0);
+    let named = |s: &Side| s.surface == draft.sheet.0 && !s.name.is_empty();
+    let side = |leaf: usize| tree.leaves[leaf].sides.iter().position(named);
     let first = draft.loops.iter().flatten().filter_map(of_half).min();
     let leaf = first.or_else(|| (0..tree.leaves.len()).find(|l| side(*l).is_some())).unwrap_or(0);
     (leaf, side(leaf).unwrap_or(0))
@@ -361,7 +407,7 @@ fn check_shells(
     for (i, draft) in drafts.iter().enumerate() {
         let shell = shells.entry(root(&parent, i)).or_default();
         shell.0 += fluxes[i].volume;
-        shell.1 += 2 - draft.loops.len() as i64;
+        shell.1 += draft.euler;
     }
     let mut seen = vec![false; vertices.len()];
     for edge in edges {

@@ -1,13 +1,16 @@
 //! A part and its values as a tree of half-spaces over interned surfaces.
 //!
-//! In: [`Part`] and one value per dimension. Out: [`Tree`]: every copy of every feature as a leaf, an intersection of
+//! In: [`Part`] and one value per dimension. Out: [`Tree`]: every copy of every feature as a leaf, a formula over
 //! half-spaces. Surfaces that coincide are one from here on: coincidence is decided here, once, on their parameters.
 
+use super::primitive::Sized;
 use super::surface::radial;
 use super::{Surface, tolerance};
-use crate::design::model::{Extent, FeatureCopy, Op, Part, Shape, Values};
-use crate::diag::Diagnostic;
+use crate::design::model::{Feature, FeatureCopy, Op, Part, Shape, Values};
+use crate::diag::{Diagnostic, Span};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use std::borrow::Cow;
+use std::iter::Peekable;
 use std::ops::Range;
 
 /// One bounding side of a leaf.
@@ -16,17 +19,87 @@ pub(super) struct Side {
     pub surface: usize,
     /// +1 when the leaf lies where the surface's distance is negative, -1 when where it is positive.
     pub sense: f64,
-    pub name: &'static str,
+    /// Empty when the leaf has no face there.
+    pub name: Cow<'static, str>,
 }
 
-/// One copy of a feature: the points inside all its sides.
+/// Where a leaf is, in terms of its sides.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Formula {
+    /// Inside that side, an index into the leaf's sides.
+    Side(usize),
+    All(Vec<Formula>),
+    Any(Vec<Formula>),
+    Not(Box<Formula>),
+}
+
+impl Formula {
+    pub fn not(of: Formula) -> Formula {
+        match of {
+            Formula::Not(inner) => *inner,
+            other => Formula::Not(Box::new(other)),
+        }
+    }
+
+    /// Whether it holds, given on which sides' inside a point is.
+    pub fn holds(&self, inside: &impl Fn(usize) -> bool) -> bool {
+        match self {
+            Formula::Side(side) => inside(*side),
+            Formula::All(terms) => terms.iter().all(|t| t.holds(inside)),
+            Formula::Any(terms) => terms.iter().any(|t| t.holds(inside)),
+            Formula::Not(term) => !term.holds(inside),
+        }
+    }
+
+    /// Whether it may hold, where some sides cannot tell: `None` stands for either answer.
+    pub fn may_hold(&self, inside: &impl Fn(usize) -> Option<bool>) -> bool {
+        self.known(inside) != Some(false)
+    }
+
+    fn known(&self, inside: &impl Fn(usize) -> Option<bool>) -> Option<bool> {
+        let fold = |terms: &[Formula], decisive: bool| {
+            let mut known = Some(!decisive);
+            for term in terms {
+                match term.known(inside) {
+                    Some(value) if value == decisive => return Some(decisive),
+                    Some(_) => {}
+                    None => known = None,
+                }
+            }
+            known
+        };
+        match self {
+            Formula::Side(side) => inside(*side),
+            Formula::All(terms) => fold(terms, false),
+            Formula::Any(terms) => fold(terms, true),
+            Formula::Not(term) => term.known(inside).map(|value| !value),
+        }
+    }
+
+    /// With a formula in place of every side.
+    pub fn replaced(&self, sides: &[Formula]) -> Formula {
+        let all = |terms: &[Formula]| terms.iter().map(|t| t.replaced(sides)).collect();
+        match self {
+            Formula::Side(side) => sides[*side].clone(),
+            Formula::All(terms) => Formula::All(all(terms)),
+            Formula::Any(terms) => Formula::Any(all(terms)),
+            Formula::Not(term) => Formula::not(term.replaced(sides)),
+        }
+    }
+}
+
+/// One copy of a primitive.
 #[derive(Debug, Clone)]
 pub(super) struct Leaf {
-    pub feature: usize,
-    /// `bore[2]`, or `bore` when the feature is not a pattern.
+    /// Of the feature it is a copy of.
+    pub span: Span,
+    /// `bore[2]`, `bore` when the feature is not a pattern, `mount[3].bore` in a group.
     pub name: String,
     pub sides: Vec<Side>,
+    pub formula: Formula,
     pub bounds: Bounds,
+    /// Whether it is material that was added, rather than cut or kept.
+    adds: bool,
 }
 
 /// A box along the part's axes.
@@ -78,74 +151,74 @@ impl Bounds {
     }
 }
 
-/// The part: features folded from first to last, each the union of its leaves.
+/// One feature: what it does to the material above it, and the leaves that it is made of.
+#[derive(Debug)]
+struct Step {
+    op: Op,
+    leaves: Range<usize>,
+    /// Of a group: the steps of each of its copies.
+    groups: Vec<Vec<Step>>,
+}
+
+/// The part: features folded from first to last, each the union of its copies.
 #[derive(Debug)]
 pub(super) struct Tree<'a> {
     pub part: &'a Part,
     pub surfaces: Vec<Surface>,
     pub leaves: Vec<Leaf>,
-    /// Operation and leaves of every feature.
-    pub features: Vec<(Op, Range<usize>)>,
+    steps: Vec<Step>,
 }
 
 impl<'a> Tree<'a> {
     /// Resolves the part at these values.
     pub fn build(part: &'a Part, values: &Values) -> Result<Self, Vec<Diagnostic>> {
-        let sizes = measure(part, values)?;
-        let mut tree = Tree { part, surfaces: Vec::new(), leaves: Vec::new(), features: Vec::new() };
-        for (index, feature) in part.features.iter().enumerate() {
-            let start = tree.leaves.len();
-            for (copy, solid) in sizes[index].iter().enumerate() {
-                let name = match feature.patterned {
-                    true => format!("{}[{}]", feature.name, copy + 1),
-                    false => feature.name.clone(),
-                };
-                tree.add_leaf(index, name, solid);
-            }
-            tree.features.push((feature.op, start..tree.leaves.len()));
+        let mut listed = Listed { part, values, leaves: Vec::new(), faults: Vec::new() };
+        let steps = listed.features(&part.features, &Isometry3::identity(), "", true, 0);
+        if !listed.faults.is_empty() {
+            return Err(listed.faults);
         }
+        let mut leaves = listed.leaves;
+        let material: Vec<Point3<f64>> =
+            leaves.iter().filter(|l| l.adds && !l.solid.is_through()).flat_map(|l| l.solid.corners()).collect();
+        leaves.iter_mut().filter(|l| l.solid.is_through()).for_each(|l| l.solid.reach_through(&material));
+        let mut tree = Tree { part, surfaces: Vec::new(), leaves: Vec::new(), steps };
+        leaves.into_iter().for_each(|leaf| tree.add_leaf(leaf));
         Ok(tree)
     }
 
     /// Whether a point is in the part, given the leaves it is in, ascending.
     pub fn inside(&self, leaves: impl Iterator<Item = usize>) -> bool {
-        let mut leaves = leaves.peekable();
-        self.features.iter().fold(false, |inside, (op, range)| {
-            let mut within = false;
-            while leaves.next_if(|l| *l < range.end).is_some() {
-                within = true;
-            }
-            match op {
-                Op::Add => inside || within,
-                Op::Cut => inside && !within,
-                Op::Keep => inside && within,
-            }
-        })
+        fold(&self.steps, &mut leaves.peekable())
     }
 
     /// A box round all material added: no face lies outside it.
     pub fn material(&self) -> Bounds {
         let mut all = Bounds::empty();
-        let added = self.features.iter().filter(|f| f.0 == Op::Add).flat_map(|f| f.1.clone());
-        added.flat_map(|l| [self.leaves[l].bounds.low, self.leaves[l].bounds.high]).for_each(|p| all.include(&p));
+        let added = self.leaves.iter().filter(|l| l.adds);
+        added.flat_map(|l| [l.bounds.low, l.bounds.high]).for_each(|p| all.include(&p));
         all
     }
 
-    /// Whether `p` lies in the leaf or within tolerance of it, not asking the surface `but`.
-    pub fn near_leaf(&self, leaf: &Leaf, p: &Point3<f64>, but: usize) -> bool {
-        let within = |s: &Side| s.surface == but || self.surfaces[s.surface].distance(p) * s.sense <= tolerance::WELD;
-        leaf.sides.iter().all(within)
+    /// Whether `p` lies in the leaf or within `reach` of it, not asking the surface `but`.
+    pub fn near_leaf(&self, leaf: &Leaf, p: &Point3<f64>, but: Option<usize>, reach: f64) -> bool {
+        leaf.formula.may_hold(&|i| {
+            let side = &leaf.sides[i];
+            let distance = self.surfaces[side.surface].distance(p) * side.sense;
+            (Some(side.surface) != but && distance.abs() > reach).then_some(distance < 0.0)
+        })
     }
 
-    fn add_leaf(&mut self, feature: usize, name: String, solid: &Sized) {
-        let sides = solid.sides().into_iter().map(|(surface, sense, name)| {
+    fn add_leaf(&mut self, listed: ListedLeaf) {
+        let (sides, formula) = listed.solid.sides();
+        let sides = sides.into_iter().map(|(surface, sense, name)| {
             let (surface, same) = self.intern(surface);
             Side { surface, sense: if same { sense } else { -sense }, name }
         });
         let sides = sides.collect();
         let mut bounds = Bounds::empty();
-        solid.corners().iter().for_each(|p| bounds.include(p));
-        self.leaves.push(Leaf { feature, name, sides, bounds });
+        listed.solid.corners().iter().for_each(|p| bounds.include(p));
+        let ListedLeaf { span, name, adds, .. } = listed;
+        self.leaves.push(Leaf { span, name, sides, formula, bounds, adds });
     }
 
     /// Index of the surface, and whether its canonical normal points the same way.
@@ -158,6 +231,103 @@ impl<'a> Tree<'a> {
         self.surfaces.push(surface);
         (self.surfaces.len() - 1, true)
     }
+}
+
+fn fold(steps: &[Step], leaves: &mut Peekable<impl Iterator<Item = usize>>) -> bool {
+    steps.iter().fold(false, |inside, step| {
+        let mut within = false;
+        for group in &step.groups {
+            within |= fold(group, leaves);
+        }
+        while leaves.next_if(|l| *l < step.leaves.end).is_some() {
+            within = true;
+        }
+        match step.op {
+            Op::Add => inside || within,
+            Op::Cut => inside && !within,
+            Op::Keep => inside && within,
+        }
+    })
+}
+
+/// A leaf before its surfaces are interned.
+struct ListedLeaf {
+    span: Span,
+    name: String,
+    solid: Sized,
+    adds: bool,
+}
+
+/// Groups in groups deeper than this are refused: nobody draws that.
+const DEEPEST: usize = 32;
+
+/// Walks features and groups in source order.
+struct Listed<'a> {
+    part: &'a Part,
+    values: &'a Values,
+    leaves: Vec<ListedLeaf>,
+    faults: Vec<Diagnostic>,
+}
+
+impl Listed<'_> {
+    fn features(
+        &mut self,
+        features: &[Feature],
+        frame: &Isometry3<f64>,
+        prefix: &str,
+        adds: bool,
+        depth: usize,
+    ) -> Vec<Step> {
+        let step = |feature: &Feature| {
+            let start = self.leaves.len();
+            let adds = adds && feature.op == Op::Add;
+            let mut groups = Vec::new();
+            for (i, copy) in feature.copies.iter().enumerate() {
+                let number = if feature.patterned { format!("[{}]", i + 1) } else { String::new() };
+                let name = format!("{prefix}{}{number}", feature.name);
+                match self.copy(feature, copy, frame, name, adds, depth) {
+                    Ok(group) => groups.extend(group),
+                    Err(reason) => {
+                        let message = format!("`{prefix}{}` of `{}` {reason}", feature.name, self.part.name);
+                        self.faults.push(Diagnostic::error("E0408", feature.span, message));
+                        break;
+                    }
+                }
+            }
+            Step { op: feature.op, leaves: start..self.leaves.len(), groups }
+        };
+        features.iter().map(step).collect()
+    }
+
+    /// The steps of a group, or a leaf more.
+    fn copy(
+        &mut self,
+        feature: &Feature,
+        copy: &FeatureCopy,
+        frame: &Isometry3<f64>,
+        name: String,
+        adds: bool,
+        depth: usize,
+    ) -> Result<Option<Vec<Step>>, String> {
+        let pose = frame * copy.pose.eval(self.values);
+        if let Shape::Group { features } = &copy.shape {
+            if depth >= DEEPEST {
+                return Err(format!("is a group more than {DEEPEST} deep"));
+            }
+            return Ok(Some(self.features(features, &pose, &format!("{name}."), adds, depth + 1)));
+        }
+        let solid = Sized::new(&copy.shape, pose, self.values)?;
+        self.leaves.push(ListedLeaf { span: feature.span, name, solid, adds });
+        Ok(None)
+    }
+}
+
+/// The surface of a face by its name; see [`super::side_at`].
+pub(super) fn side_at(part: &Part, values: &Values, face: &str) -> Option<Surface> {
+    let tree = Tree::build(part, values).ok()?;
+    let (leaf, side) = face.rsplit_once('.')?;
+    let leaf = tree.leaves.iter().find(|l| l.name == leaf)?;
+    leaf.sides.iter().find(|s| s.name == side).map(|s| tree.surfaces[s.surface].clone())
 }
 
 /// Whether two surfaces are the same set of points, and if so whether their canonical normals agree.
@@ -186,184 +356,5 @@ pub(super) fn coincide(a: &Surface, b: &Surface) -> Option<bool> {
             (same && (p - q).norm() < tolerance::POINT).then_some(true)
         }
         _ => None,
-    }
-}
-
-/// A primitive with its numbers, in the part's frame.
-struct Sized {
-    pose: Isometry3<f64>,
-    kind: Kind,
-    /// Reach along its own z.
-    low: f64,
-    high: f64,
-}
-
-enum Kind {
-    Box {
-        x: f64,
-        y: f64,
-    },
-    /// Radius at `low` and at `high`.
-    Round {
-        low: f64,
-        high: f64,
-    },
-    Ball {
-        radius: f64,
-    },
-}
-
-/// Largest magnitude of a size or a place that the kernel's tolerances are made for, in mm.
-const LARGEST: f64 = 1e5;
-/// A through feature reaches this share of the part's extent, and this many mm, beyond it at both ends.
-const BEYOND: (f64, f64) = (0.05, 1.0);
-
-/// Every feature's copies with numbers in place of expressions; `through` resolved against the material added.
-fn measure(part: &Part, values: &Values) -> Result<Vec<Vec<Sized>>, Vec<Diagnostic>> {
-    let mut faults = Vec::new();
-    let mut sized: Vec<Vec<Sized>> = Vec::new();
-    let mut material: Vec<Point3<f64>> = Vec::new();
-    for feature in &part.features {
-        let mut copies = Vec::new();
-        for copy in &feature.copies {
-            match size(copy, values) {
-                Ok(solid) => copies.push(solid),
-                Err(reason) => {
-                    let message = format!("`{}` of `{}` {reason}", feature.name, part.name);
-                    faults.push(Diagnostic::error("E0408", feature.span, message));
-                    break;
-                }
-            }
-        }
-        if feature.op == Op::Add {
-            copies.iter().filter(|c| c.low < c.high).for_each(|c| material.extend(c.corners()));
-        }
-        sized.push(copies);
-    }
-    if !faults.is_empty() {
-        return Err(faults);
-    }
-    sized.iter_mut().flatten().filter(|c| c.low >= c.high).for_each(|c| c.reach_through(&material));
-    Ok(sized)
-}
-
-/// The surface of a face by its name; see [`super::side_at`].
-pub(super) fn side_at(part: &Part, values: &Values, face: &str) -> Option<Surface> {
-    let tree = Tree::build(part, values).ok()?;
-    let (leaf, side) = face.rsplit_once('.')?;
-    let leaf = tree.leaves.iter().find(|l| l.name == leaf)?;
-    leaf.sides.iter().find(|s| s.name == side).map(|s| tree.surfaces[s.surface].clone())
-}
-
-/// Numbers of one copy; a `through` extent is left empty (`low == high`).
-fn size(copy: &FeatureCopy, values: &Values) -> Result<Sized, &'static str> {
-    let pose = copy.pose.eval(values);
-    let half = |e: &crate::design::model::Expr| positive(e.eval(values)).map(|v| v / 2.0);
-    let reach = |e: &Extent| match e {
-        Extent::Length(e) => positive(e.eval(values)),
-        Extent::Through => Ok(0.0),
-    };
-    let (kind, low, high) = match &copy.shape {
-        Shape::Box { x, y, z } => (Kind::Box { x: half(x)?, y: half(y)? }, 0.0, reach(z)?),
-        Shape::Cylinder { d, h } => {
-            let radius = half(d)?;
-            (Kind::Round { low: radius, high: radius }, 0.0, reach(h)?)
-        }
-        Shape::Cone { h: Extent::Through, .. } => {
-            return Err("is a cone without a height: `through` says nothing of its slope");
-        }
-        Shape::Cone { d1, d2, h } => {
-            let [low, high] = [d1, d2].map(|d| d.eval(values) / 2.0);
-            positive(low.max(high))?;
-            if low.min(high) < 0.0 {
-                return Err("has a negative diameter");
-            }
-            (Kind::Round { low, high }, 0.0, reach(h)?)
-        }
-        Shape::Sphere { d } => {
-            let radius = half(d)?;
-            (Kind::Ball { radius }, -radius, radius)
-        }
-        _ => return Err("is of a shape that is not built yet"),
-    };
-    let placed = pose.translation.vector.iter().all(|v| v.abs() <= LARGEST);
-    let turned = pose.rotation.coords.iter().all(|v| v.is_finite());
-    if placed && turned { Ok(Sized { pose, kind, low, high }) } else { Err("is placed out of reach") }
-}
-
-fn positive(v: f64) -> Result<f64, &'static str> {
-    if v > 10.0 * tolerance::WELD && v <= LARGEST { Ok(v) } else { Err("needs sizes above zero (and below 100 m)") }
-}
-
-impl Sized {
-    fn reach_through(&mut self, material: &[Point3<f64>]) {
-        let back = self.pose.inverse();
-        let heights = material.iter().map(|p| (back * p).z);
-        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| (a.min(z), b.max(z)));
-        let (low, high) = if low < high { (low, high) } else { (0.0, 0.0) };
-        let beyond = (high - low) * BEYOND.0 + BEYOND.1;
-        (self.low, self.high) = (low - beyond, high + beyond);
-    }
-
-    /// Corners of a box round the primitive.
-    fn corners(&self) -> [Point3<f64>; 8] {
-        let (x, y) = match self.kind {
-            Kind::Box { x, y } => (x, y),
-            Kind::Round { low, high } => (low.max(high), low.max(high)),
-            Kind::Ball { radius } => (radius, radius),
-        };
-        std::array::from_fn(|i| {
-            let pick = |bit: usize, low: f64, high: f64| if i >> bit & 1 == 0 { low } else { high };
-            self.pose * Point3::new(pick(0, -x, x), pick(1, -y, y), pick(2, self.low, self.high))
-        })
-    }
-
-    /// Bounding surfaces with the sense of [`Side`] and the name of the side.
-    fn sides(&self) -> Vec<(Surface, f64, &'static str)> {
-        let z = Vector3::z();
-        let ends = || vec![(self.flat(z, self.high), 1.0, "top"), (self.flat(-z, -self.low), 1.0, "bottom")];
-        match self.kind {
-            Kind::Box { x, y } => {
-                let walls = [
-                    ("+x", Vector3::x(), x),
-                    ("-x", -Vector3::x(), x),
-                    ("+y", Vector3::y(), y),
-                    ("-y", -Vector3::y(), y),
-                ];
-                let mut sides: Vec<_> = walls.iter().map(|(name, n, d)| (self.flat(*n, *d), 1.0, *name)).collect();
-                sides.extend(ends());
-                sides
-            }
-            Kind::Round { low, high } => {
-                let mut sides = vec![(self.flank(low, high), 1.0, "side")];
-                // A pointed end has no face.
-                let blunt = |name: &str| if name == "top" { high > tolerance::WELD } else { low > tolerance::WELD };
-                sides.extend(ends().into_iter().filter(|(_, _, name)| blunt(name)));
-                sides
-            }
-            Kind::Ball { radius } => {
-                let axis = Unit::new_normalize(Vector3::new(0.3285, 0.4871, 0.8093));
-                vec![(Surface::Sphere { centre: self.pose * Point3::origin(), radius, axis }, 1.0, "side")]
-            }
-        }
-    }
-
-    /// The plane at `distance` from the primitive's origin along its own direction `n`.
-    fn flat(&self, n: Vector3<f64>, distance: f64) -> Surface {
-        let normal = Unit::new_normalize(self.pose.rotation * n);
-        Surface::Plane { normal, offset: normal.dot(&self.pose.translation.vector) + distance }
-    }
-
-    /// The side of a cylinder or of a frustum with these end radii.
-    fn flank(&self, low: f64, high: f64) -> Surface {
-        let axis = Unit::new_normalize(self.pose.rotation * Vector3::z());
-        let height = self.high - self.low;
-        if (high - low).abs() < tolerance::POINT {
-            return Surface::Cylinder { point: self.pose * Point3::origin(), axis, radius: low.max(high) };
-        }
-        let rise = self.low - height * low / (high - low);
-        let half_angle = ((high - low).abs() / height).atan();
-        let axis = if high > low { axis } else { -axis };
-        Surface::Cone { apex: self.pose * Point3::new(0.0, 0.0, rise), axis, half_angle }
     }
 }

@@ -4,7 +4,8 @@
 //! the same samples of their common edge, so the mesh is closed without any joining; a seam uses no point of its own
 //! but on a sphere, where both its sides share them.
 
-use super::ring::{Grid, Node, Outline, Ring, offsets};
+use super::ring::{Chart, Grid, Node, Outline, Ring, lay_out, offsets};
+use super::surface::tube_angle;
 use super::{Face, Quality, Solid, Surface, TriMesh, tolerance};
 use nalgebra::Point3;
 use spade::handles::FixedVertexHandle;
@@ -34,70 +35,72 @@ fn positions(solid: &Solid) -> Vec<Point3<f64>> {
 }
 
 /// A face's outline and the nodes inside it.
-struct Patch {
+struct Patch<'a> {
+    chart: Chart<'a>,
     outline: Outline,
     inner: Vec<Node>,
 }
 
-fn patch(
-    solid: &Solid,
+fn patch<'a>(
+    solid: &'a Solid,
     face: usize,
     offsets: &[u32],
     quality: &Quality,
     positions: &mut Vec<Point3<f64>>,
-) -> Option<Patch> {
-    let surface = solid.surface(face);
+) -> Option<Patch<'a>> {
+    let (chart, rings) = rings(solid, face, offsets)?;
     let mut fresh = |uv: [f64; 2]| {
-        positions.push(surface.at(uv));
+        positions.push(chart.at(uv));
         positions.len() as u32 - 1
     };
-    let rings = rings(solid, face, offsets);
-    let outline =
-        Outline::new(surface, &rings, &mut Grid { steps: steps(surface, &rings, quality), fresh: &mut fresh })?;
-    let inner = inner_nodes(surface, &outline, quality, &mut fresh);
-    Some(Patch { outline, inner })
+    let outline = Outline::new(&chart, &rings, &mut Grid { steps: steps(&chart, &rings, quality), fresh: &mut fresh })?;
+    let inner = inner_nodes(&chart, &outline, quality, &mut fresh);
+    Some(Patch { chart, outline, inner })
 }
 
-pub(super) fn rings(solid: &Solid, face: usize, offsets: &[u32]) -> Vec<Ring> {
+pub(super) fn rings<'a>(solid: &'a Solid, face: usize, offsets: &[u32]) -> Option<(Chart<'a>, Vec<Ring>)> {
     let Face { outward, loops, .. } = &solid.faces[face];
-    loops.iter().map(|l| Ring::new(solid.surface(face), *outward, &solid.edges, offsets, l)).collect()
+    lay_out(solid.surface(face), *outward, &solid.edges, offsets, loops)
 }
 
 /// Nodes for a whole turn where a face has no edge to take them from.
-fn steps(surface: &Surface, rings: &[Ring], quality: &Quality) -> usize {
-    match surface {
-        Surface::Sphere { radius, .. } => quality.steps(*radius),
-        _ => rings.iter().map(|r| r.nodes.len()).max().unwrap_or(1),
+pub(super) fn steps(chart: &Chart, rings: &[Ring], quality: &Quality) -> [usize; 2] {
+    match chart.surface {
+        Surface::Sphere { .. } | Surface::Torus { .. } => chart.steps(quality),
+        _ => [rings.iter().map(|r| r.nodes.len()).max().unwrap_or(1), 1],
     }
 }
 
-/// Nodes inside a face that is curved: without them a triangle between two holes would cut the bulge off. On a sphere rows
-/// of latitude; on a cylinder or cone that is no plain strip, a row at each height where the border has a node.
+/// Nodes inside a face that is curved: without them a triangle between two holes would cut the bulge off. On spheres and
+/// tori a lattice of angles; on a cylinder or cone that is no plain strip, rows at the heights where the border has nodes.
 fn inner_nodes(
-    surface: &Surface,
+    chart: &Chart,
     outline: &Outline,
     quality: &Quality,
     fresh: &mut dyn FnMut([f64; 2]) -> u32,
 ) -> Vec<Node> {
-    let Some(period) = surface.period() else { return Vec::new() };
-    if rows_of_strip(surface, outline).is_some() {
+    let Some(period) = chart.periods()[0] else { return Vec::new() };
+    if rows_of_strip(chart.surface, outline).is_some() {
         return Vec::new();
     }
-    let (rows, steps) = lattice_rows(surface, outline, quality);
-    let step = period / steps as f64;
-    let girth = girth(surface, outline);
-    let point = |uv: [f64; 2]| flat(surface, girth, uv);
+    let girth = girth(chart.surface, outline);
+    let point = |uv: [f64; 2]| flat(chart, girth, uv);
     let segments = |ring: &[Node]| -> Vec<[[f64; 2]; 2]> {
         (0..ring.len()).map(|i| [point(ring[i].uv), point(ring[(i + 1) % ring.len()].uv)]).collect()
     };
     let border: Vec<_> = std::iter::once(&outline.outer).chain(&outline.holes).flat_map(|r| segments(r)).collect();
-    let us = outline.outer.iter().map(|n| n.uv[0]);
-    let (left, right) = us.fold((f64::INFINITY, f64::NEG_INFINITY), |r, u| (r.0.min(u), r.1.max(u)));
-    let clearance = point([step, rows.first().copied().unwrap_or(0.0)])[0] * CLEARANCE;
+    let range = |k: usize| {
+        let all = outline.outer.iter().map(|n| n.uv[k]);
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |r, x| [r[0].min(x), r[1].max(x)])
+    };
+    let (rows, steps) = lattice_rows(chart, outline, quality, range(1));
+    let columns = chart.places(0, range(0), steps);
+    let step = (point([period, 0.0])[0] - point([0.0, 0.0])[0]).abs() / steps as f64;
+    let clearance = step * CLEARANCE;
     let mut nodes = Vec::new();
     for v in rows {
-        for column in (left / step).ceil() as i64..=(right / step).floor() as i64 {
-            let uv = [column as f64 * step, v];
+        for u in &columns {
+            let uv = [*u, v];
             if outline.holds(uv) && border.iter().all(|s| distance(point(uv), *s) > clearance) {
                 nodes.push(Node { uv, id: fresh(uv) });
             }
@@ -108,19 +111,32 @@ fn inner_nodes(
 
 /// Least distance of an inner node from the border, as a share of a step.
 const CLEARANCE: f64 = 0.4;
+/// More heights than this at the border of a cylinder's or cone's face are no steps but a curve: rows are then spaced evenly.
+const MOST_LEVELS: usize = 12;
+/// Distance of evenly spaced rows, in steps round the axis; and the most rows.
+const ROW_STEPS: f64 = 1.5;
+const MOST_ROWS: f64 = 256.0;
 
-/// Heights v of the rows, and nodes for a whole turn.
-fn lattice_rows(surface: &Surface, outline: &Outline, quality: &Quality) -> (Vec<f64>, usize) {
-    if let Surface::Sphere { radius, .. } = surface {
-        let steps = quality.steps(*radius);
-        let angle = std::f64::consts::TAU / steps as f64;
-        let height = |row: usize| radius * (1.0 - (row as f64 * angle).cos());
-        return ((1..steps / 2).map(height).collect(), steps);
+/// Heights v of the rows, and nodes for a whole turn along u.
+fn lattice_rows(chart: &Chart, outline: &Outline, quality: &Quality, range: [f64; 2]) -> (Vec<f64>, usize) {
+    let surface = chart.surface;
+    if matches!(surface, Surface::Sphere { .. } | Surface::Torus { .. }) {
+        let steps = chart.steps(quality);
+        return (chart.places(1, range, steps[1]), steps[0]);
     }
+    let radius = girth_in_mm(surface, outline);
+    let steps = quality.steps(radius);
     let mut rows: Vec<f64> = outline.outer.iter().chain(outline.holes.iter().flatten()).map(|n| n.uv[1]).collect();
     rows.sort_by(f64::total_cmp);
     rows.dedup_by(|a, b| (*a - *b).abs() < tolerance::WELD);
-    (rows, quality.steps(girth_in_mm(surface, outline)))
+    if rows.len() > MOST_LEVELS {
+        let mm = |v: f64| flat(chart, 1.0, [0.0, v])[1];
+        let (low, high) = (mm(range[0]), mm(range[1]));
+        let step = std::f64::consts::TAU * radius / steps as f64 * ROW_STEPS;
+        let count = ((high - low) / step).ceil().clamp(2.0, MOST_ROWS) as usize;
+        rows = (1..count).map(|k| range[0] + (range[1] - range[0]) * k as f64 / count as f64).collect();
+    }
+    (rows, steps)
 }
 
 /// Radius of a cylinder, mean radius of a cone's face.
@@ -140,11 +156,16 @@ fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
 
 /// The plane that a face is triangulated in: the chart with v stretched to distance along the surface, so that circles
 /// about the axis and rulings stay straight and triangles keep their shape.
-fn flat(surface: &Surface, girth: f64, uv: [f64; 2]) -> [f64; 2] {
-    match surface {
-        Surface::Plane { .. } | Surface::Cylinder { .. } | Surface::Torus { .. } => uv,
+fn flat(chart: &Chart, girth: f64, uv: [f64; 2]) -> [f64; 2] {
+    match chart.surface {
+        Surface::Plane { .. } | Surface::Cylinder { .. } => uv,
         Surface::Cone { half_angle, .. } => [uv[0] * girth, slant(*half_angle, uv[1])],
         Surface::Sphere { radius, .. } => [uv[0], radius * (uv[1] / radius - 1.0).clamp(-1.0, 1.0).asin()],
+        Surface::Torus { major, minor, .. } => {
+            let own = chart.own(uv);
+            let (x, y) = (own[0] / minor * (major.abs() + minor), minor * tube_angle(*major, *minor, own[1]));
+            if chart.turned { [y, -x] } else { [x, y] }
+        }
     }
 }
 
@@ -162,9 +183,8 @@ fn girth(surface: &Surface, outline: &Outline) -> f64 {
 
 /// Adds the triangles of one face.
 fn fill(solid: &Solid, face: usize, patch: &Patch, mesh: &mut TriMesh) -> Option<()> {
-    let surface = solid.surface(face);
-    if let Some(triangles) = strip(surface, patch) {
-        triangles.into_iter().for_each(|t| add_triangle(solid, face, t, mesh));
+    if let Some(triangles) = strip(patch) {
+        triangles.into_iter().for_each(|t| add_triangle(solid, face, &patch.chart, t, mesh));
         return Some(());
     }
     let mut nodes: Vec<Node> = Vec::new();
@@ -176,25 +196,25 @@ fn fill(solid: &Solid, face: usize, patch: &Patch, mesh: &mut TriMesh) -> Option
         border.extend((start..end).map(|i| [i, if i + 1 < end { i + 1 } else { start }]));
     }
     nodes.extend_from_slice(&patch.inner);
-    let girth = girth(surface, &patch.outline);
-    let points: Vec<[f64; 2]> = nodes.iter().map(|n| flat(surface, girth, n.uv)).collect();
+    let girth = girth(patch.chart.surface, &patch.outline);
+    let points: Vec<[f64; 2]> = nodes.iter().map(|n| flat(&patch.chart, girth, n.uv)).collect();
     for corners in delaunay(&points, &border)? {
-        add_triangle(solid, face, corners.map(|i| nodes[i]), mesh);
+        add_triangle(solid, face, &patch.chart, corners.map(|i| nodes[i]), mesh);
     }
     Some(())
 }
 
 /// Triangles between two rows of nodes along circles about the axis: most faces of cylinders and cones, and flat
 /// quadrangles whose sides run along the chart.
-fn strip(surface: &Surface, patch: &Patch) -> Option<Vec<[Node; 3]>> {
-    let (low, high) = rows_of_strip(surface, &patch.outline)?;
+fn strip(patch: &Patch) -> Option<Vec<[Node; 3]>> {
+    let (low, high) = rows_of_strip(patch.chart.surface, &patch.outline)?;
     Some(zipped(&low, &high))
 }
 
 /// The two rows, by ascending u, of a face that has no other nodes.
 fn rows_of_strip(surface: &Surface, outline: &Outline) -> Option<(Vec<Node>, Vec<Node>)> {
     let outer = &outline.outer;
-    if !outline.holes.is_empty() || matches!(surface, Surface::Sphere { .. }) {
+    if !outline.holes.is_empty() || matches!(surface, Surface::Sphere { .. } | Surface::Torus { .. }) {
         return None;
     }
     let reach = outer.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |r, n| [r[0].min(n.uv[1]), r[1].max(n.uv[1])]);
@@ -245,7 +265,7 @@ fn shaken(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 }
 
 /// Adds a triangle given counter-clockwise in the chart; one with two corners at a pole is no triangle.
-fn add_triangle(solid: &Solid, face: usize, [a, b, c]: [Node; 3], mesh: &mut TriMesh) {
+fn add_triangle(solid: &Solid, face: usize, chart: &Chart, [a, b, c]: [Node; 3], mesh: &mut TriMesh) {
     if a.id == b.id || b.id == c.id || c.id == a.id {
         return;
     }
@@ -253,7 +273,7 @@ fn add_triangle(solid: &Solid, face: usize, [a, b, c]: [Node; 3], mesh: &mut Tri
     let corners = if outward { [a, b, c] } else { [a, c, b] };
     let sense = if outward { 1.0 } else { -1.0 };
     mesh.triangles.push(corners.map(|n| n.id));
-    mesh.normals.push(corners.map(|n| solid.surface(face).chart_normal(n.uv) * sense));
+    mesh.normals.push(corners.map(|n| chart.normal(n.uv) * sense));
     mesh.faces.push(face as u32);
 }
 

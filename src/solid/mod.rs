@@ -15,11 +15,16 @@ mod intersect;
 mod locus;
 mod measure;
 mod mesh;
+mod outline;
+mod primitive;
 mod quality;
 mod region;
 mod ring;
+mod roots;
 mod surface;
 mod tolerance;
+mod trace;
+mod traced;
 
 #[cfg(test)]
 mod tests;
@@ -37,9 +42,9 @@ pub use region::Counts;
 /// meet in a curve that is neither a line nor a circle, E0407 features touch along a line only, E0408 a size or place
 /// that makes no sense, E0410 the boundary cannot be closed.
 pub fn evaluate(part: &Part, values: &Values, quality: &Quality) -> Result<Solid, Vec<Diagnostic>> {
-    let tree = csg::Tree::build(part, values)?;
+    let mut tree = csg::Tree::build(part, values)?;
     let arrangement = arrange::arrange(&tree)?;
-    let mut solid = brep::build(&tree, arrangement, quality)?;
+    let mut solid = brep::build(&mut tree, arrangement, quality)?;
     solid.mesh = mesh::triangulate(&solid, quality).map_err(|face| {
         vec![brep::internal(&tree, &format!("`{}` cannot be filled with triangles", solid.faces[face].name))]
     })?;

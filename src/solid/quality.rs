@@ -1,6 +1,7 @@
 //! How finely curved edges and faces are sampled.
 
 use super::locus::Locus;
+use super::traced::Traced;
 use std::f64::consts::{PI, TAU};
 
 /// Limits on the samples of circles; both hold.
@@ -38,11 +39,19 @@ impl Quality {
         steps
     }
 
-    /// Parameters of the samples of an arc, both ends included. Inner samples lie on whole steps from parameter 0, so
-    /// that arcs about one axis agree wherever they start.
+    /// Parameters of the samples of an arc, both ends included. Inner samples of circles and ellipses lie on whole steps from
+    /// parameter 0, so that arcs about one axis agree wherever they start.
     pub(super) fn parameters(&self, locus: &Locus, [a, b]: [f64; 2]) -> Vec<f64> {
-        let Locus::Circle { radius, .. } = locus else { return vec![a, b] };
-        let step = TAU / self.steps(*radius) as f64;
+        let step = match locus {
+            Locus::Line { .. } => return vec![a, b],
+            Locus::Traced(curve) => return self.along(curve, a, b),
+            Locus::Circle { radius, .. } => TAU / self.steps(*radius) as f64,
+            // An ellipse turns fastest at its tips, where its radius is b²/a.
+            Locus::Ellipse { major, minor, .. } => {
+                let (long, short) = (major.norm().max(minor.norm()), major.norm().min(minor.norm()));
+                TAU / (self.steps(long) as f64 * (long / short).sqrt().clamp(1.0, 8.0)).round()
+            }
+        };
         let first = (a / step + CROWDED).ceil() as i64;
         let last = (b / step - CROWDED).floor() as i64;
         let inner = (first..=last).map(|k| k as f64 * step);
@@ -52,7 +61,35 @@ impl Quality {
         }
         all
     }
+
+    /// Samples of a traced curve: quarters of its segments, as few as both limits allow.
+    fn along(&self, curve: &Traced, a: f64, b: f64) -> Vec<f64> {
+        let steps = ((b - a) * QUARTERS).ceil().max(QUARTERS) as usize;
+        let place = |k: usize| a + (b - a) * k as f64 / steps as f64;
+        let mut all = vec![a];
+        let mut from = curve.cubic(a);
+        let mut last = from.1;
+        for k in 1..steps {
+            let here = curve.cubic(place(k + 1));
+            let turn = from.1.angle(&here.1).max(last.angle(&here.1));
+            let chord = (here.0 - from.0).norm();
+            // The height of an arc over its chord is an eighth of chord times turn.
+            if turn > self.angle || chord * turn / 8.0 > self.chord {
+                all.push(place(k));
+                from = curve.cubic(place(k));
+            }
+            last = here.1;
+        }
+        if all.len() == 1 {
+            all.push((a + b) / 2.0);
+        }
+        all.push(b);
+        all
+    }
 }
+
+/// Places per segment of a traced curve among which its samples are chosen.
+const QUARTERS: f64 = 4.0;
 
 #[cfg(test)]
 mod tests {

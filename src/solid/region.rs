@@ -16,6 +16,7 @@ pub struct Counts {
     pub cylinders: usize,
     pub cones: usize,
     pub spheres: usize,
+    pub tori: usize,
     pub edges: usize,
     /// Edges without a corner.
     pub closed_edges: usize,
@@ -26,7 +27,7 @@ pub struct Counts {
 
 impl Counts {
     pub fn faces(&self) -> usize {
-        self.planes + self.cylinders + self.cones + self.spheres
+        self.planes + self.cylinders + self.cones + self.spheres + self.tori
     }
 
     pub fn edges_with_seams(&self) -> usize {
@@ -45,14 +46,15 @@ impl Solid {
             |wanted: fn(&Surface) -> bool| self.faces.iter().filter(|f| wanted(&self.surfaces[f.surface])).count();
         let offsets = offsets(self.vertices.len(), &self.edges);
         let round = |face: &usize| {
-            let rings = mesh::rings(self, *face, &offsets);
-            self.surface(*face).period().is_some() && !rings.iter().any(|r| r.is_outer())
+            let outer = mesh::rings(self, *face, &offsets).is_some_and(|(_, rings)| rings.iter().any(|r| r.is_outer()));
+            self.surface(*face).period().is_some() && !outer
         };
         Counts {
             planes: kind(|s| matches!(s, Surface::Plane { .. })),
             cylinders: kind(|s| matches!(s, Surface::Cylinder { .. })),
             cones: kind(|s| matches!(s, Surface::Cone { .. })),
             spheres: kind(|s| matches!(s, Surface::Sphere { .. })),
+            tori: kind(|s| matches!(s, Surface::Torus { .. })),
             edges: self.edges.len(),
             closed_edges: self.edges.iter().filter(|e| e.ends[0].is_none()).count(),
             seams: (0..self.faces.len()).filter(round).count(),
@@ -86,14 +88,11 @@ impl Solid {
     /// face that goes all the way round is cut along a seam into one polygon P wide.
     pub fn face_region(&self, face: usize) -> Vec<Vec<[f64; 2]>> {
         let offsets = offsets(self.vertices.len(), &self.edges);
-        let rings = mesh::rings(self, face, &offsets);
-        let steps = match self.surface(face) {
-            Surface::Sphere { radius, .. } => Quality::default().steps(*radius),
-            _ => rings.iter().map(|r| r.nodes.len()).max().unwrap_or(1),
-        };
+        let Some((chart, rings)) = mesh::rings(self, face, &offsets) else { return Vec::new() };
+        let steps = mesh::steps(&chart, &rings, &Quality::default());
         let mut grid = Grid { steps, fresh: &mut |_| u32::MAX };
-        let Some(outline) = Outline::new(self.surface(face), &rings, &mut grid) else { return Vec::new() };
+        let Some(outline) = Outline::new(&chart, &rings, &mut grid) else { return Vec::new() };
         let polygons = std::iter::once(outline.outer).chain(outline.holes);
-        polygons.map(|nodes| nodes.iter().map(|n| n.uv).collect()).collect()
+        polygons.map(|nodes| nodes.iter().map(|n| chart.own(n.uv)).collect()).collect()
     }
 }

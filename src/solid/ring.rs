@@ -4,8 +4,76 @@
 //! one closed polygon round the face and its holes, a face that goes all the way round being cut along a seam.
 
 use super::surface::radial;
-use super::{Edge, Surface, tolerance};
-use nalgebra::Point3;
+use super::{Edge, Quality, Surface, tolerance};
+use nalgebra::{Point3, Vector3};
+use std::f64::consts::TAU;
+
+/// The chart that a face is laid out in: its surface's own, or that turned by a right angle for a face that goes round the
+/// tube of a torus, so that a face goes round along u only.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Chart<'a> {
+    pub surface: &'a Surface,
+    pub turned: bool,
+}
+
+impl Chart<'_> {
+    fn uv(&self, p: &Point3<f64>) -> [f64; 2] {
+        let [u, v] = self.surface.chart(p);
+        if self.turned { [v, -u] } else { [u, v] }
+    }
+
+    /// Coordinates in the surface's own chart.
+    pub fn own(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        if self.turned { [-v, u] } else { [u, v] }
+    }
+
+    pub fn at(&self, uv: [f64; 2]) -> Point3<f64> {
+        self.surface.at(self.own(uv))
+    }
+
+    pub fn normal(&self, uv: [f64; 2]) -> Vector3<f64> {
+        self.surface.chart_normal(self.own(uv))
+    }
+
+    /// After how much u and v start again.
+    pub fn periods(&self) -> [Option<f64>; 2] {
+        let own = [self.surface.period(), self.surface.period_across()];
+        if self.turned { [own[1], own[0]] } else { own }
+    }
+
+    /// Steps along u and v for a curve once round, fine enough for `quality`.
+    pub fn steps(&self, quality: &Quality) -> [usize; 2] {
+        let own = match self.surface {
+            Surface::Sphere { radius, .. } => [quality.steps(*radius); 2],
+            Surface::Torus { major, minor, .. } => [quality.steps(major.abs() + minor), quality.steps(*minor)],
+            _ => [1, 1],
+        };
+        if self.turned { [own[1], own[0]] } else { own }
+    }
+
+    /// Places along u (0) or v (1) at whole steps, in a range: evenly spaced in angle on spheres and tori.
+    pub fn places(&self, along: usize, [low, high]: [f64; 2], steps: usize) -> Vec<f64> {
+        let angle = |k: i64| k as f64 * TAU / steps as f64;
+        match (self.surface, (along == 1) != self.turned) {
+            (Surface::Sphere { radius, .. }, true) => {
+                let rows = (1..steps as i64 / 2).map(|k| radius * (1.0 - angle(k).cos()));
+                rows.filter(|v| low < *v && *v < high).collect()
+            }
+            (Surface::Torus { major, minor, .. }, true) => {
+                let turns = self.surface.period_across().map_or([0.0, 0.0], |p| [low / p - 0.5, high / p + 0.5]);
+                let (first, last) =
+                    ((turns[0].floor() as i64 - 1) * steps as i64, (turns[1].ceil() as i64 + 1) * steps as i64);
+                let reach = if major > minor { f64::INFINITY } else { (-major / minor).acos() };
+                let within = (first..=last).map(angle).filter(|a| a.abs() < reach);
+                within.map(|a| major * a + minor * a.sin()).filter(|v| low < *v && *v < high).collect()
+            }
+            _ => {
+                let step = self.periods()[along].unwrap_or(1.0) / steps as f64;
+                ((low / step).ceil() as i64..=(high / step).floor() as i64).map(|k| k as f64 * step).collect()
+            }
+        }
+    }
+}
 
 /// A sampled point of a face: chart coordinates, and which vertex of the mesh it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +87,32 @@ pub(super) struct Node {
 pub(super) struct Ring {
     pub nodes: Vec<Node>,
     pub winding: i32,
+    /// Zero where there is none.
     period: f64,
+    /// Of v; zero where there is none.
+    height: f64,
+}
+
+/// The loops of a face, or of all faces on one surface, and the chart they are laid out in; `None` when a loop goes round
+/// both ways at once.
+pub(super) fn lay_out<'a>(
+    surface: &'a Surface,
+    outward: bool,
+    edges: &[Edge],
+    offsets: &[u32],
+    loops: &[Vec<(usize, bool)>],
+) -> Option<(Chart<'a>, Vec<Ring>)> {
+    let chart = Chart { surface, turned: false };
+    let rings = |chart: &Chart| -> Vec<(Ring, i32)> {
+        loops.iter().map(|l| Ring::new(chart, outward, edges, offsets, l)).collect()
+    };
+    let straight = rings(&chart);
+    if straight.iter().all(|r| r.1 == 0) {
+        return Some((chart, straight.into_iter().map(|r| r.0).collect()));
+    }
+    let chart = Chart { surface, turned: true };
+    let turned = rings(&chart);
+    turned.iter().all(|r| r.1 == 0).then(|| (chart, turned.into_iter().map(|r| r.0).collect()))
 }
 
 /// First mesh vertex of each edge's inner samples: the solid's corners come first, then the samples edge by edge. One
@@ -52,8 +145,9 @@ fn vertex(edges: &[Edge], offsets: &[u32], e: usize, k: usize) -> u32 {
 }
 
 impl Ring {
-    /// The loop of (edge, runs forward), which has its face on the left seen from outside.
-    pub fn new(surface: &Surface, outward: bool, edges: &[Edge], offsets: &[u32], halves: &[(usize, bool)]) -> Self {
+    /// The loop of (edge, runs forward), which has its face on the left seen from outside; and how often it goes round along
+    /// v.
+    fn new(chart: &Chart, outward: bool, edges: &[Edge], offsets: &[u32], halves: &[(usize, bool)]) -> (Self, i32) {
         let mut points: Vec<(Point3<f64>, u32)> = Vec::new();
         for &(e, forward) in halves {
             let last = edges[e].samples.len() - 1;
@@ -64,13 +158,16 @@ impl Ring {
         if !outward {
             points.reverse();
         }
-        let period = surface.period().unwrap_or(0.0);
-        let mut ring = Ring { nodes: unroll(surface, period, &points), winding: 0, period };
-        if period > 0.0 && !ring.nodes.is_empty() {
-            let (first, last) = (ring.nodes[0].uv[0], ring.nodes[ring.nodes.len() - 1].uv[0]);
-            ring.winding = ((nearest(first, last, period) - first) / period).round() as i32;
-        }
-        ring
+        let [period, height] = chart.periods().map(|p| p.unwrap_or(0.0));
+        let nodes = unroll(chart, [period, height], &points);
+        let round = |k: usize, period: f64| match (nodes.first(), nodes.last()) {
+            (Some(first), Some(last)) if period > 0.0 => {
+                ((nearest(first.uv[k], last.uv[k], period) - first.uv[k]) / period).round() as i32
+            }
+            _ => 0,
+        };
+        let (winding, across) = (round(0, period), round(1, height));
+        (Ring { nodes, winding, period, height }, across)
     }
 
     /// Neighbouring nodes, the last with the first a winding further on.
@@ -109,14 +206,28 @@ impl Ring {
             let (low, high) = (a[0].min(b[0]), a[0].max(b[0]));
             let u = if self.period > 0.0 { low + (p[0] - low).rem_euclid(self.period) } else { p[0] };
             let v = a[1] + (b[1] - a[1]) * (u - a[0]) / (b[0] - a[0]);
+            let v = if self.height > 0.0 { p[1] - (p[1] - v).rem_euclid(self.height) } else { v };
             (low <= u && u < high && v < p[1]).then_some(v)
         };
         self.segments().filter_map(crossing).max_by(f64::total_cmp)
     }
 
+    /// The ring moved along v, where that is periodic, to the first place above `low`.
+    fn above(&self, low: &Ring) -> Ring {
+        let mut ring = self.clone();
+        if self.height > 0.0 {
+            let from = low.nodes[0].uv;
+            let off = |n: &&Node| (nearest(n.uv[0], from[0], self.period) - from[0]).abs();
+            let there = self.nodes.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map_or(from[1], |n| n.uv[1]);
+            let shift = (there - from[1]).rem_euclid(self.height) - (there - from[1]);
+            ring.nodes.iter_mut().for_each(|n| n.uv[1] += shift);
+        }
+        ring
+    }
+
     /// The ring moved by whole periods.
-    fn shifted(&self, by: f64) -> Vec<Node> {
-        self.nodes.iter().map(|n| Node { uv: [n.uv[0] + by, n.uv[1]], id: n.id }).collect()
+    fn shifted(&self, by: [f64; 2]) -> Vec<Node> {
+        self.nodes.iter().map(|n| Node { uv: [n.uv[0] + by[0], n.uv[1] + by[1]], id: n.id }).collect()
     }
 }
 
@@ -128,21 +239,23 @@ fn nearest(u: f64, to: f64, period: f64) -> f64 {
     if period > 0.0 { u + ((to - u) / period).round() * period } else { u }
 }
 
-/// Chart coordinates with continuous u. An apex or a pole, where u is undefined, becomes two nodes with its neighbours' u.
-fn unroll(surface: &Surface, period: f64, points: &[(Point3<f64>, u32)]) -> Vec<Node> {
+/// Chart coordinates with continuous u and v. An apex or a pole, where u is undefined, becomes two nodes with its neighbours'
+/// u.
+fn unroll(chart: &Chart, periods: [f64; 2], points: &[(Point3<f64>, u32)]) -> Vec<Node> {
     let charted: Vec<([f64; 2], bool, u32)> =
-        points.iter().map(|(p, id)| (surface.chart(p), singular(surface, p), *id)).collect();
+        points.iter().map(|(p, id)| (chart.uv(p), singular(chart.surface, p), *id)).collect();
     let start = charted.iter().position(|c| !c.1).unwrap_or(0);
     let mut nodes: Vec<Node> = Vec::with_capacity(charted.len());
     for i in 0..charted.len() {
         let (uv, is_singular, id) = charted[(start + i) % charted.len()];
-        let last = nodes.last().map_or(uv[0], |n: &Node| n.uv[0]);
+        let last = nodes.last().map_or(uv, |n: &Node| n.uv);
+        let v = nearest(uv[1], last[1], periods[1]);
         if is_singular {
             let after = charted[(start + i + 1) % charted.len()].0[0];
-            nodes.push(Node { uv: [last, uv[1]], id });
-            nodes.push(Node { uv: [nearest(after, last, period), uv[1]], id });
+            nodes.push(Node { uv: [last[0], v], id });
+            nodes.push(Node { uv: [nearest(after, last[0], periods[0]), v], id });
         } else {
-            nodes.push(Node { uv: [nearest(uv[0], last, period), uv[1]], id });
+            nodes.push(Node { uv: [nearest(uv[0], last[0], periods[0]), v], id });
         }
     }
     nodes
@@ -152,7 +265,9 @@ fn unroll(surface: &Surface, period: f64, points: &[(Point3<f64>, u32)]) -> Vec<
 fn singular(surface: &Surface, p: &Point3<f64>) -> bool {
     match surface {
         Surface::Cone { apex, .. } => (p - apex).norm() < tolerance::WELD,
-        Surface::Sphere { centre, .. } => radial(centre, &surface.axis(), p).norm() < tolerance::WELD,
+        Surface::Sphere { centre, .. } | Surface::Torus { centre, .. } => {
+            radial(centre, &surface.axis(), p).norm() < tolerance::WELD
+        }
         _ => false,
     }
 }
@@ -164,26 +279,30 @@ pub(super) struct Outline {
     pub holes: Vec<Vec<Node>>,
 }
 
-/// Where nodes that lie on no edge get their mesh vertices: the rows of a pole or an apex, and a seam over a sphere.
+/// Where nodes that lie on no edge get their mesh vertices: the rows of a pole or an apex, and a seam over a curved face.
 pub(super) struct Grid<'a> {
-    /// Steps for a whole turn.
-    pub steps: usize,
+    /// Steps for a whole turn along u, and along v on spheres and tori.
+    pub steps: [usize; 2],
     pub fresh: &'a mut dyn FnMut([f64; 2]) -> u32,
 }
 
 impl Outline {
     /// Makes one polygon of the rings of a face; `None` when they cannot bound one.
-    pub fn new(surface: &Surface, rings: &[Ring], grid: &mut Grid) -> Option<Self> {
+    pub fn new(chart: &Chart, rings: &[Ring], grid: &mut Grid) -> Option<Self> {
+        let periods = chart.periods();
         let outer = match rings.iter().find(|r| r.is_outer()) {
             Some(ring) => ring.nodes.clone(),
-            None => band(surface, rings, grid)?,
+            None if periods[1].is_some() && rings.iter().all(|r| r.winding == 0) => whole(chart, rings, grid)?,
+            None => band(chart, rings, grid)?,
         };
-        let period = surface.period().unwrap_or(0.0);
         let holes = rings.iter().filter(|r| r.winding == 0 && !r.is_outer());
         let placed = holes.map(|hole| {
-            let fits = |turn: &f64| encloses(&outer, hole.nodes[0].uv, turn * period);
-            let turn = [0.0, 1.0, -1.0, 2.0, -2.0].into_iter().find(fits)?;
-            Some(hole.shifted(turn * period))
+            let turns: &[f64] = &[0.0, 1.0, -1.0, 2.0, -2.0];
+            let shifts = turns.iter().flat_map(|v| turns.iter().map(move |u| [*u, *v]));
+            let mut shifts = shifts.map(|s| [s[0] * periods[0].unwrap_or(0.0), s[1] * periods[1].unwrap_or(0.0)]);
+            let at = hole.nodes[0].uv;
+            let shift = shifts.find(|s| encloses(&outer, [at[0] + s[0], at[1] + s[1]]))?;
+            Some(hole.shifted(shift))
         });
         let holes = placed.collect::<Option<Vec<_>>>()?;
         Some(Outline { outer, holes })
@@ -191,13 +310,12 @@ impl Outline {
 
     /// True for chart coordinates inside the outer polygon and in no hole.
     pub fn holds(&self, uv: [f64; 2]) -> bool {
-        encloses(&self.outer, uv, 0.0) && !self.holes.iter().any(|h| encloses(h, uv, 0.0))
+        encloses(&self.outer, uv) && !self.holes.iter().any(|h| encloses(h, uv))
     }
 }
 
-/// Even-odd test of `p` moved by `shift` along u.
-fn encloses(polygon: &[Node], p: [f64; 2], shift: f64) -> bool {
-    let p = [p[0] + shift, p[1]];
+/// Even-odd test.
+fn encloses(polygon: &[Node], p: [f64; 2]) -> bool {
     let mut inside = false;
     for (i, a) in polygon.iter().enumerate() {
         let b = polygon[(i + 1) % polygon.len()].uv;
@@ -212,35 +330,83 @@ fn encloses(polygon: &[Node], p: [f64; 2], shift: f64) -> bool {
 
 /// The polygon of a face that goes all the way round: along its lower ring, up a seam, back along its upper ring, down
 /// the seam.
-fn band(surface: &Surface, rings: &[Ring], grid: &mut Grid) -> Option<Vec<Node>> {
-    let period = surface.period()?;
-    let top = match surface {
-        Surface::Sphere { radius, .. } => Some(2.0 * radius),
-        _ => None,
-    };
+fn band(chart: &Chart, rings: &[Ring], grid: &mut Grid) -> Option<Vec<Node>> {
+    let period = chart.periods()[0]?;
+    let [bottom, top] = chart.surface.poles();
     let low = rings.iter().find(|r| r.winding == 1);
     let high = rings.iter().find(|r| r.winding == -1);
     let (low, high) = match (low, high) {
-        (Some(low), Some(high)) => (low.clone(), high.clone()),
+        (Some(low), Some(high)) => (low.clone(), high.above(low)),
         (Some(low), None) => (low.clone(), pole(low.nodes[0].uv[0], top?, period, -1, grid)),
-        (None, Some(high)) => (pole(high.nodes[0].uv[0] - period, 0.0, period, 1, grid), high.clone()),
-        (None, None) => (pole(0.0, 0.0, period, 1, grid), pole(period, top?, period, -1, grid)),
+        (None, Some(high)) => (pole(high.nodes[0].uv[0] - period, bottom?, period, 1, grid), high.clone()),
+        (None, None) => (pole(0.0, bottom?, period, 1, grid), pole(period, top?, period, -1, grid)),
     };
     let (b, t) = seam(rings, &low, &high);
     let (low, high) = (opened(&low, b), opened(&high, t));
     let shift = nearest(high[0].uv[0], low[low.len() - 1].uv[0], period) - high[0].uv[0];
     let high: Vec<Node> = high.iter().map(|n| Node { uv: [n.uv[0] + shift, n.uv[1]], id: n.id }).collect();
-    let up = seam_nodes(surface, low[low.len() - 1], high[0], grid);
+    let up = seam_nodes(chart, low[low.len() - 1], high[0], grid);
     let down = up.iter().rev().map(|n| Node { uv: [n.uv[0] - period, n.uv[1]], id: n.id });
     Some(low.iter().chain(&up).chain(&high).copied().chain(down).collect())
 }
 
+/// The polygon of a face that is all of a torus but for holes: a rectangle between seams that keep off the holes.
+fn whole(chart: &Chart, rings: &[Ring], grid: &mut Grid) -> Option<Vec<Node>> {
+    let (width, height) = (chart.periods()[0]?, chart.periods()[1]?);
+    let [left, bottom] = [widest_gap(rings, 0, width)?, widest_gap(rings, 1, height)?];
+    let corner = Node { uv: [left, bottom], id: (grid.fresh)([left, bottom]) };
+    let moved = |n: &Node, by: [f64; 2]| Node { uv: [n.uv[0] + by[0], n.uv[1] + by[1]], id: n.id };
+    let along = |k: usize, from: f64, size: f64| {
+        let places = chart.places(k, [from + size * CLOSE, from + size * (1.0 - CLOSE)], grid.steps[k]);
+        places.into_iter().map(|x| if k == 0 { [x, bottom] } else { [left, x] }).collect::<Vec<_>>()
+    };
+    let (row, column) = (along(0, left, width), along(1, bottom, height));
+    let mut fresh =
+        |uvs: Vec<[f64; 2]>| -> Vec<Node> { uvs.into_iter().map(|uv| Node { uv, id: (grid.fresh)(uv) }).collect() };
+    let (row, column) = (fresh(row), fresh(column));
+    let mut polygon = vec![corner];
+    polygon.extend_from_slice(&row);
+    polygon.push(moved(&corner, [width, 0.0]));
+    polygon.extend(column.iter().map(|n| moved(n, [width, 0.0])));
+    polygon.push(moved(&corner, [width, height]));
+    polygon.extend(row.iter().rev().map(|n| moved(n, [0.0, height])));
+    polygon.push(moved(&corner, [0.0, height]));
+    polygon.extend(column.iter().rev());
+    Some(polygon)
+}
+
+/// Nodes of a seam keep this share of its length from its ends.
+const CLOSE: f64 = 0.004;
+
+/// The middle of the widest stretch along u (0) or v (1) that no ring lies over.
+fn widest_gap(rings: &[Ring], along: usize, period: f64) -> Option<f64> {
+    let mut taken: Vec<[f64; 2]> = Vec::new();
+    for ring in rings {
+        let all = ring.nodes.iter().map(|n| n.uv[along]);
+        let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |r, x| [r[0].min(x), r[1].max(x)]);
+        let low_in = low.rem_euclid(period);
+        taken.push([low_in, low_in + high - low]);
+    }
+    taken.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let Some(first) = taken.first().copied() else { return Some(0.0) };
+    let mut reach = first[1];
+    let mut best: Option<[f64; 2]> = None;
+    for next in taken[1..].iter().chain(&[[first[0] + period, 0.0]]) {
+        let gap = next[0] - reach;
+        if gap > 0.0 && best.is_none_or(|b| gap > b[1] - b[0]) {
+            best = Some([reach, next[0]]);
+        }
+        reach = reach.max(next[1]);
+    }
+    best.map(|[a, b]| (a + b) / 2.0)
+}
+
 /// A pole or an apex drawn as a ring of nodes at height `v`, all one vertex.
 fn pole(start: f64, v: f64, period: f64, winding: i32, grid: &mut Grid) -> Ring {
-    let step = period / grid.steps as f64 * f64::from(winding);
+    let step = period / grid.steps[0] as f64 * f64::from(winding);
     let id = (grid.fresh)([start, v]);
-    let nodes = (0..grid.steps).map(|k| Node { uv: [start + step * k as f64, v], id }).collect();
-    Ring { nodes, winding, period }
+    let nodes = (0..grid.steps[0]).map(|k| Node { uv: [start + step * k as f64, v], id }).collect();
+    Ring { nodes, winding, period, height: 0.0 }
 }
 
 /// Nodes of the lower and upper ring that a straight seam can join: the steepest that crosses no ring.
@@ -289,16 +455,16 @@ fn opened(ring: &Ring, start: usize) -> Vec<Node> {
     (start..=start + count).map(node).collect()
 }
 
-/// Nodes between the ends of a seam: none on a straight ruling, one per step of latitude on a sphere.
-fn seam_nodes(surface: &Surface, from: Node, to: Node, grid: &mut Grid) -> Vec<Node> {
-    let Surface::Sphere { radius, .. } = surface else { return Vec::new() };
-    let latitude = |v: f64| (v / radius - 1.0).clamp(-1.0, 1.0).asin();
-    let (low, high) = (latitude(from.uv[1]), latitude(to.uv[1]));
-    let steps = ((high - low).abs() / (std::f64::consts::TAU / grid.steps as f64)).ceil().max(1.0) as usize;
+/// Nodes between the ends of a seam: none on a straight ruling, one per step on a sphere or a torus.
+fn seam_nodes(chart: &Chart, from: Node, to: Node, grid: &mut Grid) -> Vec<Node> {
+    if !matches!(chart.surface, Surface::Sphere { .. } | Surface::Torus { .. }) {
+        return Vec::new();
+    }
+    let rise = to.uv[1] - from.uv[1];
+    let range = [from.uv[1] + rise.abs() * CLOSE, to.uv[1] - rise.abs() * CLOSE];
     let mut nodes = Vec::new();
-    for k in 1..steps {
-        let share = k as f64 / steps as f64;
-        let v = radius * (1.0 + (low + (high - low) * share).sin());
+    for v in chart.places(1, range, grid.steps[1]) {
+        let share = (v - from.uv[1]) / rise;
         let uv = [from.uv[0] + (to.uv[0] - from.uv[0]) * share, v];
         nodes.push(Node { uv, id: (grid.fresh)(uv) });
     }

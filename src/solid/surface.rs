@@ -120,6 +120,30 @@ impl Surface {
         }
     }
 
+    /// Height of the chart of a torus, where v starts again; `None` for the others, and for a torus that reaches its axis.
+    pub fn period_across(&self) -> Option<f64> {
+        match self {
+            Surface::Torus { major, minor, .. } if major > minor => Some(TAU * major),
+            _ => None,
+        }
+    }
+
+    /// The v of the chart at which a whole row is one point: an apex, the poles of a sphere or of a torus that reaches its
+    /// axis; below and above the rest.
+    pub(super) fn poles(&self) -> [Option<f64>; 2] {
+        match self {
+            Surface::Plane { .. } | Surface::Cylinder { .. } => [None, None],
+            Surface::Cone { .. } => [Some(0.0), None],
+            Surface::Sphere { radius, .. } => [Some(0.0), Some(2.0 * radius)],
+            Surface::Torus { major, minor, .. } if major > minor => [None, None],
+            Surface::Torus { major, minor, .. } => {
+                let angle = (-major / minor).acos();
+                let v = major * angle + minor * angle.sin();
+                [Some(-v), Some(v)]
+            }
+        }
+    }
+
     /// Chart coordinates of `p`, in the frame of [`Surface::frame`]:
     /// plane (x, y); cylinder (rθ, z); cone (θ, s² sin α / 2) with s the distance from the apex; sphere
     /// (Rθ, R + z), z the height above the centre; torus (rθ, Rφ + r sin φ), φ the angle round the tube from the side away
