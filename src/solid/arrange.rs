@@ -41,7 +41,7 @@ pub(super) struct Arc {
     pub uses: Vec<Use>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Arrangement {
     pub curves: Vec<Locus>,
     pub corners: Vec<Point3<f64>>,

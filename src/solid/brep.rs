@@ -6,6 +6,7 @@
 
 use super::arrange::{Arc, Arrangement, Use};
 use super::csg::{Leaf, Side, Tree};
+use super::locus::Locus;
 use super::measure::{self, Flux, Run};
 use super::ring::{Ring, lay_out, offsets};
 use super::{Edge, Face, Quality, Solid, Surface, TriMesh};
@@ -24,7 +25,8 @@ type Loop = Vec<(usize, bool)>;
 pub(super) fn build(tree: &mut Tree, mut arrangement: Arrangement, quality: &Quality) -> Result<Solid, Faults> {
     check_manifold(tree, &arrangement)?;
     let vertices = compact(&mut arrangement);
-    let mut edges: Vec<Edge> = arrangement.arcs.iter().map(|a| edge(&arrangement, a, &vertices, quality)).collect();
+    let mut edges: Vec<Edge> =
+        arrangement.arcs.iter().map(|a| edge(tree, &arrangement, a, &vertices, quality)).collect();
     turn_spheres(tree, &arrangement, &edges);
     let tree = &*tree;
     let mut drafts = Vec::new();
@@ -125,9 +127,11 @@ fn compact(arrangement: &mut Arrangement) -> Vec<Point3<f64>> {
     vertices
 }
 
-fn edge(arrangement: &Arrangement, arc: &Arc, vertices: &[Point3<f64>], quality: &Quality) -> Edge {
+fn edge(tree: &Tree, arrangement: &Arrangement, arc: &Arc, vertices: &[Point3<f64>], quality: &Quality) -> Edge {
     let locus = &arrangement.curves[arc.curve];
-    let mut samples: Vec<Point3<f64>> = quality.parameters(locus, arc.span).iter().map(|t| locus.at(*t)).collect();
+    let surfaces: Vec<&Surface> = arc.uses.iter().map(|u| &tree.surfaces[u.surface]).collect();
+    let parameters = finer(locus, &surfaces, quality.parameters(locus, arc.span), quality);
+    let mut samples: Vec<Point3<f64>> = parameters.iter().map(|t| locus.at(*t)).collect();
     let last = samples.len() - 1;
     match arc.ends {
         Some([a, b]) => (samples[0], samples[last]) = (vertices[a], vertices[b]),
@@ -136,6 +140,44 @@ fn edge(arrangement: &Arrangement, arc: &Arc, vertices: &[Point3<f64>], quality:
     let ends = arc.ends.map_or([None, None], |e| e.map(Some));
     Edge { curve: locus.curve(arc.span), ends, faces: [usize::MAX; 2], samples }
 }
+
+/// Samples halved until between two of them the curve is as straight in the chart of either surface as it is in space: what
+/// is a chord in space may be a bow in the chart, where faces are filled.
+fn finer(locus: &Locus, surfaces: &[&Surface], mut parameters: Vec<f64>, quality: &Quality) -> Vec<f64> {
+    if matches!(locus, Locus::Line { .. }) {
+        return parameters;
+    }
+    let wide = |a: f64, b: f64| {
+        let places = [a, (a + b) / 2.0, b].map(|t| locus.at(t));
+        surfaces.iter().any(|s| {
+            let Some(period) = s.period() else { return false };
+            let [from, _, to] = places.each_ref().map(|p| s.chart(p));
+            let turn = to[0] - from[0];
+            let turn = turn - (turn / period).round() * period;
+            let middle = s.at([from[0] + turn / 2.0, (from[1] + to[1]) / 2.0]);
+            turn.abs() > WIDEST * period || s.period_across().is_none() && (middle - places[1]).norm() > quality.chord
+        })
+    };
+    for _ in 0..FINEST_HALVINGS {
+        let mut next = vec![parameters[0]];
+        for w in parameters.windows(2) {
+            if wide(w[0], w[1]) {
+                next.push((w[0] + w[1]) / 2.0);
+            }
+            next.push(w[1]);
+        }
+        if next.len() == parameters.len() {
+            break;
+        }
+        parameters = next;
+    }
+    parameters
+}
+
+/// Widest turn round a surface's axis between two samples, as a share of a whole turn.
+const WIDEST: f64 = 1.0 / 14.0;
+/// How often a chord is halved at most: near an apex no chord is short enough.
+const FINEST_HALVINGS: usize = 6;
 
 /// Half-edges by sheet.
 fn sheets(arcs: &[Arc]) -> BTreeMap<Sheet, Vec<(usize, bool)>> {
@@ -180,7 +222,8 @@ fn trace(tree: &Tree, arrangement: &Arrangement, sheet: Sheet, halves: &[(usize,
     Ok(loops)
 }
 
-/// Of the half-edges that leave a corner, the first clockwise from the one that came.
+/// Of the half-edges that leave a corner, the first clockwise from the one that came. Where curves touch at the corner their
+/// bends decide.
 fn sharpest(
     tree: &Tree,
     arrangement: &Arrangement,
@@ -192,24 +235,54 @@ fn sharpest(
     if let [only] = choices {
         return Some(*only);
     }
-    let direction = |(arc, forward): (usize, bool), at_end: bool| {
+    let back = Leaving::new(arrangement, (came.0, !came.1));
+    let normal = tree.surfaces[surface].normal_at(&back.corner) * if outward { 1.0 } else { -1.0 };
+    let bend = |l: &Leaving| l.bend.dot(&normal.cross(&l.direction));
+    let clockwise = |h: usize| {
+        let leaving = Leaving::new(arrangement, halves[h]);
+        let (d, from) = (leaving.direction, back.direction);
+        let angle = -(normal.dot(&from.cross(&d))).atan2(from.dot(&d));
+        // Straight back comes last: a face is not left by the edge it came along. A curve that touches that edge and bends
+        // away clockwise comes first.
+        let angle = match angle {
+            a if a.abs() < TIE && bend(&leaving) < bend(&back) - SAME_BEND => 0.0,
+            a if a.abs() < TIE => TAU,
+            a if a < 0.0 => a + TAU,
+            a => a,
+        };
+        ((angle / TIE).round() as i64, -bend(&leaving))
+    };
+    let before =
+        |a: &(i64, f64), b: &(i64, f64)| if (a.0 - b.0).abs() <= 1 { a.1.total_cmp(&b.1) } else { a.0.cmp(&b.0) };
+    choices.iter().copied().min_by(|a, b| before(&clockwise(*a), &clockwise(*b)))
+}
+
+/// Directions at a corner that differ by less (rad) touch: two curves that overlap by the tolerance of touching.
+const TIE: f64 = 2e-5;
+/// Bends (1/mm) that differ by less are one edge's.
+const SAME_BEND: f64 = 1e-6;
+
+/// How a half-edge leaves its corner: direction, and how the direction turns per mm.
+struct Leaving {
+    corner: Point3<f64>,
+    direction: Vector3<f64>,
+    bend: Vector3<f64>,
+}
+
+/// Share of an edge over which its bend at the end is taken.
+const BEND_SHARE: f64 = 1e-3;
+
+impl Leaving {
+    fn new(arrangement: &Arrangement, (arc, forward): (usize, bool)) -> Self {
         let arc = &arrangement.arcs[arc];
-        let t = arc.span[usize::from(forward == at_end)];
         let locus = &arrangement.curves[arc.curve];
-        (locus.at(t), locus.tangent(t) * if forward { 1.0 } else { -1.0 })
-    };
-    let (corner, arriving) = direction(came, true);
-    let normal = tree.surfaces[surface].normal_at(&corner) * if outward { 1.0 } else { -1.0 };
-    let back = -arriving;
-    let clockwise = |d: Vector3<f64>| {
-        let angle = -(normal.dot(&back.cross(&d))).atan2(back.dot(&d));
-        // Straight back comes last: a face is not left by the edge it came along.
-        if angle <= 1e-9 { angle + TAU } else { angle }
-    };
-    choices
-        .iter()
-        .copied()
-        .min_by(|a, b| clockwise(direction(halves[*a], false).1).total_cmp(&clockwise(direction(halves[*b], false).1)))
+        let way = if forward { 1.0 } else { -1.0 };
+        let t = arc.span[usize::from(!forward)];
+        let on = t + way * (arc.span[1] - arc.span[0]) * BEND_SHARE;
+        let (corner, direction) = (locus.at(t), locus.tangent(t) * way);
+        let length = (locus.at(on) - corner).norm().max(f64::MIN_POSITIVE);
+        Leaving { corner, direction, bend: (locus.tangent(on) * way - direction) / length }
+    }
 }
 
 /// Sorts the loops of a sheet into faces: from the lowest point of each hole, the first loop met straight below bounds

@@ -44,9 +44,31 @@ pub use region::Counts;
 pub fn evaluate(part: &Part, values: &Values, quality: &Quality) -> Result<Solid, Vec<Diagnostic>> {
     let mut tree = csg::Tree::build(part, values)?;
     let arrangement = arrange::arrange(&tree)?;
-    let mut solid = brep::build(&mut tree, arrangement, quality)?;
+    let mut outcome = close(&mut tree, &arrangement, quality);
+    // Chords of curves that come near each other, or touch, may cross where the curves do not: shorter ones do not.
+    for (chord, angle) in FINER {
+        if !outcome.as_ref().is_err_and(|faults| faults.iter().any(|f| f.code == "E0410")) {
+            break;
+        }
+        let finer = Quality { chord: quality.chord * chord, angle: quality.angle * angle };
+        outcome = close(&mut tree, &arrangement, &finer).or(outcome);
+    }
+    outcome
+}
+
+/// Shares of the quality that are tried when chords are too coarse for a part. The first changes the samples of about half of
+/// all circles, so that two that touch get chords of different angles.
+const FINER: [(f64, f64); 4] = [(0.5, 1.0), (0.25, 0.5), (0.06, 0.5), (0.01, 0.25)];
+
+/// Faces and triangles.
+fn close(
+    tree: &mut csg::Tree,
+    arrangement: &arrange::Arrangement,
+    quality: &Quality,
+) -> Result<Solid, Vec<Diagnostic>> {
+    let mut solid = brep::build(tree, arrangement.clone(), quality)?;
     solid.mesh = mesh::triangulate(&solid, quality).map_err(|face| {
-        vec![brep::internal(&tree, &format!("`{}` cannot be filled with triangles", solid.faces[face].name))]
+        vec![brep::internal(tree, &format!("`{}` cannot be filled with triangles", solid.faces[face].name))]
     })?;
     Ok(solid)
 }

@@ -74,7 +74,7 @@ impl Quality {
             let turn = from.1.angle(&here.1).max(last.angle(&here.1));
             let chord = (here.0 - from.0).norm();
             // The height of an arc over its chord is an eighth of chord times turn.
-            if turn > self.angle || chord * turn / 8.0 > self.chord {
+            if turn > self.angle * SPARE || chord * turn / 8.0 > self.chord * SPARE {
                 all.push(place(k));
                 from = curve.cubic(place(k));
             }
@@ -88,6 +88,8 @@ impl Quality {
     }
 }
 
+/// Share of the limits that is used up: what rounding up to powers of two leaves on circles, on average.
+const SPARE: f64 = 0.6;
 /// Places per segment of a traced curve among which its samples are chosen.
 const QUARTERS: f64 = 4.0;
 

@@ -239,8 +239,8 @@ fn nearest(u: f64, to: f64, period: f64) -> f64 {
     if period > 0.0 { u + ((to - u) / period).round() * period } else { u }
 }
 
-/// Chart coordinates with continuous u and v. An apex or a pole, where u is undefined, becomes two nodes with its neighbours'
-/// u.
+/// Chart coordinates with continuous u and v. An apex or a pole, where u is undefined, becomes a row of
+/// nodes from the u of the one neighbour to that of the other.
 fn unroll(chart: &Chart, periods: [f64; 2], points: &[(Point3<f64>, u32)]) -> Vec<Node> {
     let charted: Vec<([f64; 2], bool, u32)> =
         points.iter().map(|(p, id)| (chart.uv(p), singular(chart.surface, p), *id)).collect();
@@ -252,14 +252,22 @@ fn unroll(chart: &Chart, periods: [f64; 2], points: &[(Point3<f64>, u32)]) -> Ve
         let v = nearest(uv[1], last[1], periods[1]);
         if is_singular {
             let after = charted[(start + i + 1) % charted.len()].0[0];
-            nodes.push(Node { uv: [last[0], v], id });
-            nodes.push(Node { uv: [nearest(after, last[0], periods[0]), v], id });
+            // With the face on the left, a lower pole is passed towards larger u, an upper one towards smaller.
+            let lower = chart.surface.poles()[0].is_some_and(|low| (v - low).abs() < tolerance::WELD);
+            let onward = (after - last[0]).rem_euclid(periods[0]);
+            let turn = if lower { onward } else { onward - periods[0] };
+            let steps = (turn.abs() / periods[0] * POLE_STEPS).ceil().max(1.0);
+            // One point, but with a normal of its own for every direction.
+            nodes.extend((0..=steps as usize).map(|k| Node { uv: [last[0] + turn * k as f64 / steps, v], id }));
         } else {
             nodes.push(Node { uv: [nearest(uv[0], last[0], periods[0]), v], id });
         }
     }
     nodes
 }
+
+/// Nodes for a whole turn about an apex or a pole.
+const POLE_STEPS: f64 = 64.0;
 
 /// True at an apex or a pole.
 fn singular(surface: &Surface, p: &Point3<f64>) -> bool {
@@ -290,13 +298,15 @@ impl Outline {
     /// Makes one polygon of the rings of a face; `None` when they cannot bound one.
     pub fn new(chart: &Chart, rings: &[Ring], grid: &mut Grid) -> Option<Self> {
         let periods = chart.periods();
-        let outer = match rings.iter().find(|r| r.is_outer()) {
-            Some(ring) => ring.nodes.clone(),
-            None if periods[1].is_some() && rings.iter().all(|r| r.winding == 0) => whole(chart, rings, grid)?,
+        let (outer, used) = match rings.iter().find(|r| r.is_outer()) {
+            Some(ring) => (ring.nodes.clone(), Vec::new()),
+            None if periods[1].is_some() && rings.iter().all(|r| r.winding == 0) => {
+                (whole(chart, rings, grid)?, Vec::new())
+            }
             None => band(chart, rings, grid)?,
         };
-        let holes = rings.iter().filter(|r| r.winding == 0 && !r.is_outer());
-        let placed = holes.map(|hole| {
+        let holes = rings.iter().enumerate().filter(|(i, r)| r.winding == 0 && !r.is_outer() && !used.contains(i));
+        let placed = holes.map(|(_, hole)| {
             let turns: &[f64] = &[0.0, 1.0, -1.0, 2.0, -2.0];
             let shifts = turns.iter().flat_map(|v| turns.iter().map(move |u| [*u, *v]));
             let mut shifts = shifts.map(|s| [s[0] * periods[0].unwrap_or(0.0), s[1] * periods[1].unwrap_or(0.0)]);
@@ -329,8 +339,8 @@ fn encloses(polygon: &[Node], p: [f64; 2]) -> bool {
 }
 
 /// The polygon of a face that goes all the way round: along its lower ring, up a seam, back along its upper ring, down
-/// the seam.
-fn band(chart: &Chart, rings: &[Ring], grid: &mut Grid) -> Option<Vec<Node>> {
+/// the seam; and the holes that the seam passes.
+fn band(chart: &Chart, rings: &[Ring], grid: &mut Grid) -> Option<(Vec<Node>, Vec<usize>)> {
     let period = chart.periods()[0]?;
     let [bottom, top] = chart.surface.poles();
     let low = rings.iter().find(|r| r.winding == 1);
@@ -341,13 +351,108 @@ fn band(chart: &Chart, rings: &[Ring], grid: &mut Grid) -> Option<Vec<Node>> {
         (None, Some(high)) => (pole(high.nodes[0].uv[0] - period, bottom?, period, 1, grid), high.clone()),
         (None, None) => (pole(0.0, bottom?, period, 1, grid), pole(period, top?, period, -1, grid)),
     };
-    let (b, t) = seam(rings, &low, &high);
+    let (b, t, way) = match seam(rings, &low, &high) {
+        Some((b, t)) => (b, t, Vec::new()),
+        None => detour(rings, &low, &high)?,
+    };
     let (low, high) = (opened(&low, b), opened(&high, t));
-    let shift = nearest(high[0].uv[0], low[low.len() - 1].uv[0], period) - high[0].uv[0];
+    // Up the seam, round one side of each hole on its way.
+    let mut up: Vec<Node> = Vec::new();
+    let mut down: Vec<Node> = Vec::new();
+    let mut last = low[low.len() - 1];
+    for stop in &way {
+        let ring = opened(&rings[stop.ring], stop.entry);
+        let (du, dv) = (last.uv[0] - ring[0].uv[0], last.uv[1] - ring[0].uv[1]);
+        let shift = [nearest(0.0, du, period), nearest(0.0, dv, chart.periods()[1].unwrap_or(0.0))];
+        let ring: Vec<Node> =
+            ring.iter().map(|n| Node { uv: [n.uv[0] + shift[0], n.uv[1] + shift[1]], id: n.id }).collect();
+        let bridge = seam_nodes(chart, last, ring[0], grid);
+        let turn = (stop.exit + ring.len() - 1 - stop.entry) % (ring.len() - 1);
+        // Down the seam again, round its other side.
+        let other: Vec<Node> = ring[turn..].iter().chain(bridge.iter().rev()).copied().collect();
+        down.splice(0..0, other);
+        up.extend(bridge.iter().chain(&ring[..=turn]));
+        last = ring[turn];
+    }
+    let shift = nearest(high[0].uv[0], last.uv[0], period) - high[0].uv[0];
     let high: Vec<Node> = high.iter().map(|n| Node { uv: [n.uv[0] + shift, n.uv[1]], id: n.id }).collect();
-    let up = seam_nodes(chart, low[low.len() - 1], high[0], grid);
-    let down = up.iter().rev().map(|n| Node { uv: [n.uv[0] - period, n.uv[1]], id: n.id });
-    Some(low.iter().chain(&up).chain(&high).copied().chain(down).collect())
+    let bridge = seam_nodes(chart, last, high[0], grid);
+    down.splice(0..0, bridge.iter().rev().copied());
+    up.extend(bridge);
+    let down = down.iter().map(|n| Node { uv: [n.uv[0] - period, n.uv[1]], id: n.id });
+    let outer = low.iter().chain(&up).chain(&high).copied().chain(down).collect();
+    Some((outer, way.iter().map(|s| s.ring).collect()))
+}
+
+/// A hole that the seam leads to, and on from.
+struct Stop {
+    ring: usize,
+    /// Nodes of the ring where the seam comes and where it goes on.
+    entry: usize,
+    exit: usize,
+}
+
+/// Pairs of nodes that are tried between two rings, the nearest first.
+const BRIDGES: usize = 64;
+
+/// A seam from hole to hole, where holes leave no straight way from the lower ring to the upper: by breadth first search over
+/// the bridges that cross no ring.
+fn detour(rings: &[Ring], low: &Ring, high: &Ring) -> Option<(usize, usize, Vec<Stop>)> {
+    let holes: Vec<usize> = (0..rings.len()).filter(|i| rings[*i].winding == 0 && !rings[*i].is_outer()).collect();
+    let end = holes.len() + 1;
+    let place = |k: usize| {
+        if k == 0 {
+            low
+        } else if k == end {
+            high
+        } else {
+            &rings[holes[k - 1]]
+        }
+    };
+    let mut from: Vec<Option<(usize, usize, usize)>> = vec![None; end + 1];
+    let mut open = std::collections::VecDeque::from([0]);
+    while let Some(here) = open.pop_front() {
+        for next in (1..=end).rev() {
+            if next == here || from[next].is_some() {
+                continue;
+            }
+            if let Some((a, b)) = bridge(rings, place(here), place(next)) {
+                from[next] = Some((here, a, b));
+                open.push_back(next);
+            }
+        }
+        if from[end].is_some() {
+            break;
+        }
+    }
+    let (mut here, mut exit, last) = from[end]?;
+    let mut way = Vec::new();
+    while here != 0 {
+        let (before, leaves, entry) = from[here]?;
+        way.push(Stop { ring: holes[here - 1], entry, exit });
+        (here, exit) = (before, leaves);
+    }
+    way.reverse();
+    Some((exit, last, way))
+}
+
+/// The nearest nodes of two rings that a straight line joins without crossing a ring.
+fn bridge(rings: &[Ring], a: &Ring, b: &Ring) -> Option<(usize, usize)> {
+    let apart = |i: usize, j: usize| {
+        let (p, q) = (a.nodes[i].uv, b.nodes[j].uv);
+        (nearest(q[0], p[0], a.period) - p[0]).hypot(nearest(q[1], p[1], a.height) - p[1])
+    };
+    let mut pairs: Vec<(f64, usize, usize)> = (0..a.nodes.len())
+        .flat_map(|i| (0..b.nodes.len()).map(move |j| (i, j)))
+        .map(|(i, j)| (apart(i, j), i, j))
+        .collect();
+    pairs.sort_by(|p, q| p.0.total_cmp(&q.0).then((p.1, p.2).cmp(&(q.1, q.2))));
+    let clear = |&&(_, i, j): &&(f64, usize, usize)| {
+        let p = a.nodes[i].uv;
+        let q = [nearest(b.nodes[j].uv[0], p[0], a.period), nearest(b.nodes[j].uv[1], p[1], a.height)];
+        rings.iter().chain([a, b]).all(|r| r.segments().all(|s| !crosses(p, q, s, a.period)))
+    };
+    pairs.iter().take(BRIDGES).find(clear).map(|p| (p.1, p.2))
 }
 
 /// The polygon of a face that is all of a torus but for holes: a rectangle between seams that keep off the holes.
@@ -410,7 +515,7 @@ fn pole(start: f64, v: f64, period: f64, winding: i32, grid: &mut Grid) -> Ring 
 }
 
 /// Nodes of the lower and upper ring that a straight seam can join: the steepest that crosses no ring.
-fn seam(rings: &[Ring], low: &Ring, high: &Ring) -> (usize, usize) {
+fn seam(rings: &[Ring], low: &Ring, high: &Ring) -> Option<(usize, usize)> {
     let period = low.period;
     let upper = |b: usize| {
         let u = low.nodes[b].uv[0];
@@ -425,7 +530,7 @@ fn seam(rings: &[Ring], low: &Ring, high: &Ring) -> (usize, usize) {
         let c = [nearest(high.nodes[t].uv[0], a[0], period), high.nodes[t].uv[1]];
         rings.iter().all(|r| r.segments().all(|s| !crosses(a, c, s, period)))
     };
-    pairs.iter().find(clear).or(pairs.first()).map_or((0, 0), |p| (p.1, p.2))
+    pairs.iter().find(clear).map(|p| (p.1, p.2))
 }
 
 /// Whether segment `s`, moved by whole periods, meets the segment from `a` to `c` other than at its ends.
@@ -461,9 +566,14 @@ fn seam_nodes(chart: &Chart, from: Node, to: Node, grid: &mut Grid) -> Vec<Node>
         return Vec::new();
     }
     let rise = to.uv[1] - from.uv[1];
-    let range = [from.uv[1] + rise.abs() * CLOSE, to.uv[1] - rise.abs() * CLOSE];
+    let (low, high) = (from.uv[1].min(to.uv[1]), from.uv[1].max(to.uv[1]));
+    let range = [low + rise.abs() * CLOSE, high - rise.abs() * CLOSE];
+    let mut places = chart.places(1, range, grid.steps[1]);
+    if rise < 0.0 {
+        places.reverse();
+    }
     let mut nodes = Vec::new();
-    for v in chart.places(1, range, grid.steps[1]) {
+    for v in places {
         let share = (v - from.uv[1]) / rise;
         let uv = [from.uv[0] + (to.uv[0] - from.uv[0]) * share, v];
         nodes.push(Node { uv, id: (grid.fresh)(uv) });

@@ -1,5 +1,6 @@
 //! Solids against closed forms and the reference figures of an independent modeller.
 
+mod oblique;
 mod random;
 mod wheel;
 
@@ -356,10 +357,6 @@ fn faults_have_codes() {
     let slab = || one("slab", Op::Add, block(10.0, 10.0, 2.0), 0.0);
     assert_eq!(faults(vec![slab(), one("all", Op::Cut, through(block(20.0, 20.0, 0.0)), 0.0)]), ["E0401"]);
     assert_eq!(faults(vec![slab(), one("saw", Op::Cut, through(block(1.0, 20.0, 0.0)), 0.0)]), ["E0405"]);
-    assert_eq!(
-        faults(vec![slab(), feature("drill", Op::Cut, vec![(cylinder(2.0, 9.0), turned([0.3, 0.2, 0.0]))])]),
-        ["E0406"]
-    );
     let corner = feature("corner", Op::Add, vec![(block(10.0, 10.0, 2.0), pose([10.0, 10.0, 0.0], 0.0))]);
     assert_eq!(faults(vec![slab(), corner]), ["E0407"]);
     assert_eq!(faults(vec![one("slab", Op::Add, block(10.0, -1.0, 2.0), 0.0)]), ["E0408"]);
