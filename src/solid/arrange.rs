@@ -225,7 +225,7 @@ impl SharedCurve {
         let near = self.bounds.widened(tolerance::CULL);
         let mut stop = |p: Point3<f64>, stops: &mut Vec<(f64, usize)>| {
             let corner = corners.intern(p);
-            stops.push((self.locus.parameter(&corners.points[corner]), corner));
+            stops.extend(self.locus.parameters(&corners.points[corner]).into_iter().map(|t| (t, corner)));
         };
         let mut known: BTreeMap<usize, Vec<Point3<f64>>> = BTreeMap::new();
         for leaf in tree.leaves.iter().filter(|l| l.bounds.common(&near).is_some()) {
@@ -247,11 +247,19 @@ impl SharedCurve {
             }
         }
         stops.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        stops.dedup_by_key(|s| s.1);
-        if self.locus.period().is_some() && stops.len() > 1 && stops[0].1 == stops[stops.len() - 1].1 {
+        stops.dedup_by(|b, a| self.at_one_corner(*a, *b));
+        if let (Some(period), [first, .., last]) = (self.locus.period(), &stops[..])
+            && self.at_one_corner(*last, (first.0 + period, first.1))
+        {
             stops.pop();
         }
         stops
+    }
+
+    /// Whether two stops are one, rather than the ends of a loop from a corner back to it.
+    fn at_one_corner(&self, a: (f64, usize), b: (f64, usize)) -> bool {
+        let [from, middle] = [a.0, (a.0 + b.0) / 2.0].map(|t| self.locus.at(t));
+        a.1 == b.1 && (middle - from).norm() < CELL
     }
 
     /// Arcs between neighbouring stops; a closed curve without a stop is one arc.
@@ -436,6 +444,8 @@ fn dissolve(arcs: Vec<Arc>, corners: usize, curves: &[SharedCurve]) -> Vec<Arc> 
 
 /// Joins the last arc of a closed curve to its first, and makes a closed arc of one that meets itself.
 fn close_up(arcs: &mut Vec<Arc>, first: usize, degree: &[u32], curves: &[SharedCurve]) {
+    let period = arcs.get(first).and_then(|a| curves[a.curve].locus.period());
+    let Some(period) = period else { return };
     if arcs.len() > first + 1 && joins(&arcs[arcs.len() - 1], &arcs[first], degree) {
         let head = arcs.remove(first);
         if let Some(last) = arcs.last_mut() {
@@ -445,7 +455,7 @@ fn close_up(arcs: &mut Vec<Arc>, first: usize, degree: &[u32], curves: &[SharedC
     if let Some(only) = arcs.get_mut(first)
         && only.ends.is_some_and(|[a, b]| a == b && degree[a] == 2)
     {
-        only.span = [0.0, curves[only.curve].locus.period().unwrap_or(0.0)];
+        only.span = [0.0, period];
         only.ends = None;
     }
 }

@@ -307,6 +307,10 @@ fn group(tree: &Tree, sheet: Sheet, loops: Vec<Loop>, edges: &[Edge], corners: u
         let (a, b) = (root(&parent, i), root(&parent, below.map_or(south, |b| b.1)));
         parent[a.min(b)] = a.max(b);
     }
+    // What is left of a torus all round is one face: rays from one of its holes to another may go in circles.
+    if surface.period_across().is_some() && rings.iter().all(|r| !r.is_outer() && r.winding == 0) {
+        parent.iter_mut().for_each(|p| *p = south);
+    }
     let mut faces: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     (0..south).for_each(|i| faces.entry(root(&parent, i)).or_default().push(i));
     faces.into_values().map(|members| draft(tree, sheet, &members, &rings, &loops)).collect()
@@ -349,7 +353,7 @@ fn whole_surfaces(tree: &Tree, drafts: &[Draft]) -> Vec<Draft> {
     let whole = |(i, surface): (usize, &Surface)| {
         let p = match surface {
             Surface::Sphere { centre, radius, .. } => centre + Vector3::new(0.48, 0.6, 0.64) * *radius,
-            Surface::Torus { major, minor, .. } if major > minor => surface.at([0.37 * minor, 0.53 * major]),
+            Surface::Torus { major, minor, .. } => surface.at([0.37 * minor, 0.53 * (major + minor)]),
             _ => return None,
         };
         if drafts.iter().any(|d| d.sheet.0 == i) {
@@ -365,7 +369,7 @@ fn whole_surfaces(tree: &Tree, drafts: &[Draft]) -> Vec<Draft> {
         };
         let inside = |side: f64| tree.inside((0..tree.leaves.len()).filter(|l| holds(*l, side)));
         let (below, above) = (inside(-1.0), inside(1.0));
-        let euler = if matches!(surface, Surface::Torus { .. }) { 0 } else { 2 };
+        let euler = if surface.period_across().is_some() { 0 } else { 2 };
         let draft = Draft { sheet: (i, below), loops: Vec::new(), euler, owner: (0, 0) };
         (below != above).then_some(draft)
     };

@@ -5,7 +5,7 @@
 
 use super::Surface;
 use super::locus::Locus;
-use super::surface::radial;
+use super::surface::{is_ring, radial};
 use super::tolerance;
 use super::trace::Shared;
 use nalgebra::{Point3, Unit, Vector3};
@@ -196,7 +196,7 @@ fn plane_torus(
         let loci = [1.0, -1.0].map(|side| Locus::circle(centre + out * (side * major), *normal, minor)).to_vec();
         let pole = (minor * minor - major * major).max(0.0).sqrt();
         let poles = [pole, -pole].map(|z| centre + axis.into_inner() * z);
-        return Known::All(Shared { loci, nodes: if pole > 0.0 { poles.to_vec() } else { Vec::new() } });
+        return Known::All(Shared { loci, nodes: if !is_ring(major, minor) { poles.to_vec() } else { Vec::new() } });
     }
     traced()
 }

@@ -94,6 +94,15 @@ impl Locus {
         }
     }
 
+    /// Parameters of all passages through `p`, a point on the curve: a traced curve may come back to a place where its
+    /// surfaces touch.
+    pub fn parameters(&self, p: &Point3<f64>) -> Vec<f64> {
+        match self {
+            Locus::Traced(curve) => curve.passages(p),
+            _ => vec![self.parameter(p)],
+        }
+    }
+
     /// After how much the parameter of a closed curve returns to the same point.
     pub fn period(&self) -> Option<f64> {
         match self {

@@ -7,7 +7,7 @@
 
 use super::Surface;
 use super::locus::Locus;
-use super::surface::across;
+use super::surface::{across, is_ring, pole_angle};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{PI, TAU};
 
@@ -168,23 +168,24 @@ fn spin(axis: &Vector3<f64>, origin: &Point3<f64>, p: &Point3<f64>, motion: &Vec
 /// Area of a face of a torus, and the integral over it of `R cos φ + r`. Green's theorem in the angles (θ, φ): as `-∮ G(φ) dθ`
 /// where the loops do not go round the tube, else as `∮ θ g(φ) dφ`. Either is known up to whole tori.
 fn tube(surface: &Surface, sense: f64, loops: &[Vec<Run>], major: f64, minor: f64) -> (f64, f64) {
-    // Area and flux of the tube from φ = 0 on, per radian of θ.
+    // Area and flux of the tube from φ = 0 on, per radian of θ. Both are counted from the lower end of the tube, so that a
+    // lower pole adds nothing and an upper one the whole.
     let area_to = |phi: f64| minor * (major * phi + minor * phi.sin());
     let flux_to = |phi: f64| {
         let (squares, mixed) = (major * major + minor * minor, major * minor);
         minor * (squares * phi.sin() + mixed * (1.5 * phi + (2.0 * phi).sin() / 4.0))
     };
-    let ends = if major > minor { PI } else { (-major / minor).acos() };
+    let ends = pole_angle(major, minor);
     let (all_area, all_flux) = (TAU * 2.0 * area_to(ends), TAU * 2.0 * flux_to(ends));
     let rings: Vec<Vec<Angles>> = loops.iter().map(|runs| angles(surface, runs)).collect();
-    let round_tube = major > minor && rings.iter().any(|ring| turns(ring));
+    let round_tube = is_ring(major, minor) && rings.iter().any(|ring| turns(ring));
     let mut sums = [0.0, 0.0];
     for step in rings.iter().flatten() {
         let (area, flux) = if round_tube {
             let (density, distance) = (minor * (major + minor * step.phi.cos()), major * step.phi.cos() + minor);
             (step.theta * density * step.phi_by, step.theta * density * distance * step.phi_by)
         } else {
-            (-area_to(step.phi) * step.theta_by, -flux_to(step.phi) * step.theta_by)
+            (-(area_to(step.phi) + area_to(ends)) * step.theta_by, -(flux_to(step.phi) + flux_to(ends)) * step.theta_by)
         };
         sums[0] += area * sense;
         sums[1] += flux * sense;

@@ -3,7 +3,7 @@
 //! In: a surface, edges with their samples, loops. Out: [`Ring`]s, unrolled so that u is continuous, and [`Outline`]s:
 //! one closed polygon round the face and its holes, a face that goes all the way round being cut along a seam.
 
-use super::surface::radial;
+use super::surface::{is_ring, pole_angle, radial};
 use super::{Edge, Quality, Surface, tolerance};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
@@ -63,7 +63,7 @@ impl Chart<'_> {
                 let turns = self.surface.period_across().map_or([0.0, 0.0], |p| [low / p - 0.5, high / p + 0.5]);
                 let (first, last) =
                     ((turns[0].floor() as i64 - 1) * steps as i64, (turns[1].ceil() as i64 + 1) * steps as i64);
-                let reach = if major > minor { f64::INFINITY } else { (-major / minor).acos() };
+                let reach = if is_ring(*major, *minor) { f64::INFINITY } else { pole_angle(*major, *minor) };
                 let within = (first..=last).map(angle).filter(|a| a.abs() < reach);
                 within.map(|a| major * a + minor * a.sin()).filter(|v| low < *v && *v < high).collect()
             }

@@ -5,7 +5,7 @@
 //! Charts are right-handed with the canonical normal and *equal-area*: a region's area in the chart, in mm², is its
 //! area on the surface. So one formula, `-∮ v du`, measures every kind of face.
 
-use super::Surface;
+use super::{Surface, tolerance};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
@@ -123,7 +123,7 @@ impl Surface {
     /// Height of the chart of a torus, where v starts again; `None` for the others, and for a torus that reaches its axis.
     pub fn period_across(&self) -> Option<f64> {
         match self {
-            Surface::Torus { major, minor, .. } if major > minor => Some(TAU * major),
+            Surface::Torus { major, minor, .. } if is_ring(*major, *minor) => Some(TAU * major),
             _ => None,
         }
     }
@@ -135,9 +135,9 @@ impl Surface {
             Surface::Plane { .. } | Surface::Cylinder { .. } => [None, None],
             Surface::Cone { .. } => [Some(0.0), None],
             Surface::Sphere { radius, .. } => [Some(0.0), Some(2.0 * radius)],
-            Surface::Torus { major, minor, .. } if major > minor => [None, None],
+            Surface::Torus { major, minor, .. } if is_ring(*major, *minor) => [None, None],
             Surface::Torus { major, minor, .. } => {
-                let angle = (-major / minor).acos();
+                let angle = pole_angle(*major, *minor);
                 let v = major * angle + minor * angle.sin();
                 [Some(-v), Some(v)]
             }
@@ -216,9 +216,9 @@ impl Surface {
 /// The angle φ round the tube of a torus with `major φ + minor sin φ = v`: the left side never falls where the surface
 /// is, so bisection finds it, and Newton's steps make it exact.
 pub(super) fn tube_angle(major: f64, minor: f64, v: f64) -> f64 {
-    let turns = if major > minor { (v / (TAU * major)).round() } else { 0.0 };
+    let turns = if is_ring(major, minor) { (v / (TAU * major)).round() } else { 0.0 };
     let v = v - turns * TAU * major;
-    let reach = if major >= minor { TAU / 2.0 } else { (-major / minor).acos() };
+    let reach = pole_angle(major, minor);
     let (mut low, mut high) = (-reach, reach);
     let mut angle = (v / (major + minor)).clamp(low, high);
     for _ in 0..TUBE_STEPS {
@@ -236,6 +236,16 @@ pub(super) fn tube_angle(major: f64, minor: f64, v: f64) -> f64 {
         angle = next;
     }
     angle + turns * TAU
+}
+
+/// Whether a torus keeps off its axis.
+pub(super) fn is_ring(major: f64, minor: f64) -> bool {
+    major > minor + tolerance::WELD
+}
+
+/// The angle φ at which a torus ends: where it meets its axis, or half way round.
+pub(super) fn pole_angle(major: f64, minor: f64) -> f64 {
+    (-major / minor).clamp(-1.0, 1.0).acos()
 }
 
 /// Steps after which bisection alone has used up the precision of a double.

@@ -124,14 +124,48 @@ impl Traced {
             (p - (a + (b - a) * share)).norm()
         };
         let segment = (0..self.segments()).min_by(|i, j| near(i).total_cmp(&near(j))).unwrap_or(0);
+        let t = self.parameter_in(segment, p);
+        if self.closed { t.rem_euclid(self.segments() as f64) } else { t }
+    }
+
+    /// Of the point of one segment nearest to `p`.
+    fn parameter_in(&self, segment: usize, p: &Point3<f64>) -> f64 {
         let mut s = 0.5;
         for _ in 0..STEPS {
             let (q, motion) = cubic((&self.points[segment], &self.tangents[segment]), self.end(segment), s);
             let step = (p - q).dot(&motion) / motion.norm_squared();
             s = (s + step).clamp(0.0, 1.0);
         }
-        let t = segment as f64 + s;
-        if self.closed { t.rem_euclid(self.segments() as f64) } else { t }
+        segment as f64 + s
+    }
+
+    /// Parameters at which the curve passes `p`, ascending; the nearest where it passes none.
+    pub fn passages(&self, p: &Point3<f64>) -> Vec<f64> {
+        let mut found: Vec<f64> = Vec::new();
+        for segment in 0..self.segments() {
+            let (from, to) = (self.points[segment], *self.end(segment).0);
+            let chord = to - from;
+            let share = ((p - from).dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
+            if (p - (from + chord * share)).norm() > chord.norm() * BOW {
+                continue;
+            }
+            let t = self.parameter_in(segment, p);
+            let passes = (self.cubic(t).0 - p).norm() < PASSES;
+            let again = found.iter().any(|f| (self.cubic((f + t) / 2.0).0 - p).norm() < PASSES && (f - t).abs() < 1.0);
+            if passes && !again {
+                found.push(t);
+            }
+        }
+        if self.closed {
+            let last = self.segments() as f64;
+            found.iter_mut().for_each(|t| *t = t.rem_euclid(last));
+            found.sort_by(f64::total_cmp);
+            let wraps = found.len() > 1 && found[0] < WRAPPED && found[found.len() - 1] > last - WRAPPED;
+            if wraps {
+                found.pop();
+            }
+        }
+        if found.is_empty() { vec![self.parameter(p)] } else { found }
     }
 
     /// Whether both are the same points: either's lie on the surfaces of the other.
@@ -243,6 +277,12 @@ impl Traced {
     }
 }
 
+/// How far a segment bows out from its chord at most, as a share of it; more than enough for the turn of a step.
+const BOW: f64 = 0.1;
+/// A curve that comes this near a point (mm) passes it.
+const PASSES: f64 = 5e-6;
+/// Parameters this near both ends of a closed curve are one place.
+const WRAPPED: f64 = 1e-3;
 /// A point that Newton's steps move farther than this (mm) from the cubic has gone astray, as may happen where the surfaces
 /// touch: the cubic is nearer than that by construction.
 const STRAYED: f64 = 1e-4;

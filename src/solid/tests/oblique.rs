@@ -241,3 +241,48 @@ fn groups_are_folded_by_themselves() {
     let s = both(&[features[0].clone(), ring], 3200.0 - 2.0 * PI * (9.0 - 2.25) * 2.0);
     assert_eq!((s.counts().planes, s.counts().cylinders), (10, 4));
 }
+
+#[test]
+fn curves_cross_where_surfaces_touch() {
+    // A cylinder that touches a sphere from inside (Viviani), and a cross hole that touches the bore.
+    let viviani = vec![
+        feature("pin", Op::Add, vec![at(cylinder(6.0, 4.0), [-1.0, 0.0, 0.0], [0.0; 3])]),
+        feature("ball", Op::Add, vec![at(ball(8.0), [-1.0, 1.0, 1.0], [0.0; 3])]),
+    ];
+    both(&viviani, 274.5863865931568);
+    let bores = vec![
+        one("bar", Op::Add, cylinder(16.0, 20.0), 0.0),
+        one("bore", Op::Cut, through(cylinder(10.0, 0.0)), 0.0),
+        feature("cross", Op::Cut, vec![at(cylinder(6.0, 12.0), [0.0, 2.0, 10.0], [0.0, PI / 2.0, 0.0])]),
+    ];
+    let (given, turned) = (solid(bores.clone()), solid(moved(&bores)));
+    assert!((given.volume - turned.volume).abs() < 1e-6, "{} {}", given.volume, turned.volume);
+}
+
+#[test]
+fn a_torus_may_be_drilled_all_round() {
+    let hole = |k: usize| {
+        let a = TAU * k as f64 / 4.0;
+        at(through(cylinder(3.0, 0.0)), [10.0 * a.cos(), 10.0 * a.sin(), 0.0], [0.0; 3])
+    };
+    let ring = vec![one("ring", Op::Add, torus(20.0, 4.0), 0.0), feature("hole", Op::Cut, (0..4).map(hole).collect())];
+    let s = both(&ring, 685.107177806);
+    assert_eq!((s.counts().tori, s.counts().cylinders, s.counts().edges), (1, 4, 8));
+    // A lemon, whole, and a cylinder rounded down to its axis.
+    let lemon = outline([0.0, -12.0], &[("peel", [0.0, 12.0], Some((18.0, true)))]);
+    let centre = 180.0f64.sqrt();
+    let lens = |z: f64| ((324.0 - z * z).sqrt() - centre).powi(2);
+    let exact = PI * (0..60_000).map(|k| lens(-12.0 + (f64::from(k) + 0.5) / 2500.0) / 2500.0).sum::<f64>();
+    both(&[one("lemon", Op::Add, Shape::Revolve { outline: lemon }, 0.0)], exact);
+    let dimple = outline(
+        [0.0, 0.0],
+        &[
+            ("foot", [2.0, 0.0], None),
+            ("side", [2.0, 2.0], None),
+            ("top", [0.5, 2.0], None),
+            ("dip", [0.0, 1.5], Some((0.5, true))),
+        ],
+    );
+    let dip = TAU * (0.125 - (PI / 16.0 * 0.5 - 0.125 / 3.0));
+    both(&[one("dimple", Op::Add, Shape::Revolve { outline: dimple }, 0.0)], 8.0 * PI - dip);
+}
