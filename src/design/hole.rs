@@ -1,8 +1,9 @@
 //! What a workshop has its own word for, put together from primitives: holes and chamfered cylinders.
 //!
 //! A hole stands on the face it is drilled into: that face is z = 0 of the feature, and the hole goes down from there,
-//! whatever its depth. Its features are named `bore`, `head` and `point`. A chamfered cylinder is a turned outline
-//! whose sides have the names of a plain cylinder's faces.
+//! whatever its depth. Like the tool that makes it, it also clears a little above, so that no skin is left where the face
+//! lies higher within its tolerance. Its features are named `bore`, `head` and `point`. A chamfered cylinder is a turned
+//! outline whose sides have the names of a plain cylinder's faces.
 
 use super::dimension::trim;
 use super::interval::{half, minus, plus, times};
@@ -15,6 +16,9 @@ use crate::units::Quantity;
 
 /// Angles of drills and countersinks lie between these (degrees): a point flatter or slimmer is a slip of the pen.
 const ANGLES: [f64; 2] = [10.0, 170.0];
+/// How far a hole clears above its face (mm), but no farther than its mouth's radius: more than the general tolerance of
+/// anything shorter than a metre, less than what stands apart on a part.
+const CLEARANCE: f64 = 1.0;
 /// That of a countersink when nothing is said (rad).
 const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
 
@@ -26,7 +30,7 @@ impl Sizes<'_, '_> {
         let (d, h) = (self.size("d", "6"), self.extent("h"));
         let tip = self.has("tip").then(|| self.angle("tip"));
         let (d, h) = (d?, h?);
-        let mut features = vec![self.bore(d.clone(), h.clone())];
+        let mut features = vec![self.bore(d.clone(), h.clone(), self.clearance(&d))];
         match (tip, h) {
             (Some(_), Extent::Through) => {
                 self.no_end("tip", "a hole that goes through has no point");
@@ -55,8 +59,9 @@ impl Sizes<'_, '_> {
             Extent::Length(h) => self.larger(h, "h", &head_h, "head_h"),
             Extent::Through => true,
         };
-        let head = Shape::Cylinder { d: head_d, h: Extent::Length(head_h.clone()) };
-        let features = vec![self.bore(d, h), self.member("head", head, minus(Expr::Const(0.0), head_h))];
+        let clear = Expr::Const(self.clearance(&head_d));
+        let head = Shape::Cylinder { d: head_d, h: Extent::Length(plus(head_h.clone(), clear)) };
+        let features = vec![self.bore(d, h, 0.0), self.member("head", head, minus(Expr::Const(0.0), head_h))];
         (wide && deep).then_some(Shape::Group { features })
     }
 
@@ -83,8 +88,11 @@ impl Sizes<'_, '_> {
             );
             return None;
         }
-        let cone = Shape::Cone { d1: d.clone(), d2: head_d, h: Extent::Length(depth.clone()) };
-        let features = vec![self.bore(d, h), self.member("head", cone, minus(Expr::Const(0.0), depth))];
+        let clear = self.clearance(&head_d);
+        let wide = plus(head_d, Expr::Const(2.0 * clear * (angle / 2.0).tan()));
+        let height = plus(depth.clone(), Expr::Const(clear));
+        let cone = Shape::Cone { d1: d.clone(), d2: wide, h: Extent::Length(height) };
+        let features = vec![self.bore(d, h, 0.0), self.member("head", cone, minus(Expr::Const(0.0), depth))];
         Some(Shape::Group { features })
     }
 
@@ -167,12 +175,18 @@ impl Sizes<'_, '_> {
         None
     }
 
-    fn bore(&self, d: Expr, h: Extent) -> Feature {
-        let bottom = match &h {
-            Extent::Length(h) => minus(Expr::Const(0.0), h.clone()),
-            Extent::Through => Expr::Const(0.0),
+    /// A cylinder from its depth up to `clear` mm above the face.
+    fn bore(&self, d: Expr, h: Extent, clear: f64) -> Feature {
+        let (bottom, h) = match h {
+            Extent::Length(h) => (minus(Expr::Const(0.0), h.clone()), Extent::Length(plus(h, Expr::Const(clear)))),
+            Extent::Through => (Expr::Const(0.0), Extent::Through),
         };
         self.member("bore", Shape::Cylinder { d, h }, bottom)
+    }
+
+    /// How far a hole with this mouth clears above its face (mm).
+    fn clearance(&self, d: &Expr) -> f64 {
+        CLEARANCE.min(d.eval(&self.resolver.nominal) / 2.0)
     }
 
     /// A feature of the group that stands at `z` on its axis.
