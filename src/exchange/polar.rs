@@ -12,6 +12,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 /// A point nearer to the axis than this (mm) has no longitude: the kernel's corners are one from here on.
 const NO_LONGITUDE: f64 = 1e-6;
 
+/// A curve that strays less than this (mm) from a meridian or a parallel is one.
+const STRAIGHT: f64 = 1e-7;
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
     Cylinder,
@@ -84,6 +87,23 @@ impl Polar {
     /// Radius of a torus' tube (mm), zero elsewhere.
     pub fn tube(&self) -> f64 {
         if let Kind::Torus { minor, .. } = self.kind { minor } else { 0.0 }
+    }
+
+    /// Whether a curve on the surface is a meridian or a parallel, hence straight on the map.
+    pub fn is_straight(&self, track: &Track) -> bool {
+        let points = track.steps().into_iter().map(|t| track.at(t)).filter(|p| self.has_longitude(p));
+        let points: Vec<Point3<f64>> = points.collect();
+        let Some(start) = points.first().map(|p| self.uv(p)) else { return true };
+        let lengths = matches!(self.kind, Kind::Cylinder | Kind::Cone);
+        let reach = points.iter().map(|p| self.distance_from_axis(p)).fold(self.tube().max(self.radius()), f64::max);
+        let off = |k: usize| {
+            let away = |p: &Point3<f64>| match self.uv(p)[k] - start[k] {
+                length if k == 1 && lengths => length.abs(),
+                angle => 2.0 * (angle / 2.0).sin().abs() * reach,
+            };
+            points.iter().map(away).fold(0.0, f64::max)
+        };
+        off(0) < STRAIGHT || off(1) < STRAIGHT
     }
 
     /// A torus whose tube misses the axis: its heights start again after a turn.

@@ -32,6 +32,8 @@ const COST_SEAM: usize = 5;
 const COST_SLANTED: usize = 1000;
 /// Circles of a sphere's loops tried for its axis.
 const CIRCLES: usize = 16;
+/// Longest arc that is curved on a map (rad).
+const QUARTER: f64 = TAU / 4.0;
 /// Directions are parallel or square to this cosine, beyond the rounding of turned parts.
 const STRAIGHT: f64 = 1e-9;
 
@@ -101,6 +103,30 @@ impl<'a> Seamstress<'a> {
             self.marks[edge].push(t);
             self.marks[edge].sort_by(f64::total_cmp);
         }
+    }
+
+    /// Marks the quarters of arcs that are curved on the map of a face. Readers of the kind of Open CASCADE draw an edge on the
+    /// map through a few points, the same number for every arc; in quarters that is right to 1e-7 of its size, and in one
+    /// piece it would not be.
+    pub fn quarter(&mut self, plans: &[Plan]) {
+        for (face, plan) in self.solid.faces.iter().zip(plans) {
+            let Some(polar) = &plan.polar else { continue };
+            for (edge, _) in face.loops.iter().flatten() {
+                self.quarters(*edge, polar).into_iter().for_each(|t| self.mark(*edge, t));
+            }
+        }
+    }
+
+    fn quarters(&self, edge: usize, polar: &Polar) -> Vec<f64> {
+        let track = &self.tracks[edge];
+        let Track::Arc { sweep, .. } = track else { return Vec::new() };
+        let count = (sweep / QUARTER - STRAIGHT).ceil().max(1.0);
+        if count < 2.0 || polar.is_straight(track) {
+            return Vec::new();
+        }
+        let closed = self.solid.edges[edge].ends[0].is_none();
+        let (first, from) = if closed { (0, self.marks[edge].first().copied().unwrap_or(0.0)) } else { (1, 0.0) };
+        (first..count as usize).map(|k| (from + k as f64 / count).rem_euclid(1.0)).collect()
     }
 
     /// The mark at this place of an edge, if there is one.

@@ -46,6 +46,7 @@ impl Skin {
     pub fn new(solid: &Solid) -> Option<Skin> {
         let mut sewing = Seamstress::new(solid)?;
         let plans: Vec<Plan> = (0..solid.faces.len()).map(|f| sewing.open(f)).collect();
+        sewing.quarter(&plans);
         let mut tailor = Tailor::new(sewing);
         let panels = plans.into_iter().enumerate().map(|(f, plan)| tailor.panel(f, plan)).collect();
         Some(Skin { points: tailor.points, rims: tailor.rims, panels, shells: shells(solid) })
