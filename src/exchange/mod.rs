@@ -7,6 +7,7 @@ pub mod gltf;
 pub mod step;
 
 mod colour;
+mod cut;
 mod json;
 mod part21;
 mod polar;

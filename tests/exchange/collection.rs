@@ -213,9 +213,12 @@ fn rims() -> Vec<(&'static str, Vec<Feature>)> {
     ]
 }
 
+pub fn part(name: &str, features: Vec<Feature>) -> Part {
+    Part { name: name.into(), material: 0, features, span: Span::default() }
+}
+
 fn evaluated(name: &str, features: Vec<Feature>) -> Result<Solid, Vec<Diagnostic>> {
-    let part = Part { name: name.into(), material: 0, features, span: Span::default() };
-    evaluate(&part, &[], &Quality::default())
+    evaluate(&part(name, features), &[], &Quality::default())
 }
 
 /// The same features turned and moved together.
