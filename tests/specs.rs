@@ -4,6 +4,7 @@
 
 use gonogo::design::model::{Corner, Design, Expr, LightShape, Sense, Shape};
 use gonogo::design::{Loaded, load};
+use gonogo::solid::Quality;
 
 fn read(path: &str) -> std::io::Result<String> {
     std::fs::read_to_string(path)
@@ -200,6 +201,26 @@ fn examples_of_the_manual_compile() {
         );
         let loaded = load("manual.gng", &|_| Ok(text.clone()), &[]);
         assert!(loaded.diagnostics.is_empty(), "{:#?}\n{text}", loaded.diagnostics);
+        solids_keep_their_faces(&loaded.design.unwrap());
+    }
+}
+
+#[test]
+fn the_spec_of_all_shapes_keeps_its_faces_within_tolerance() {
+    solids_keep_their_faces(&design("shapes"));
+}
+
+/// Every part can be made at least material, at nominal and at most material, with the same faces and more each time.
+fn solids_keep_their_faces(design: &Design) {
+    for part in &design.parts {
+        let made = |values: &[f64]| -> (Vec<String>, f64) {
+            let solid = gonogo::solid::evaluate(part, values, &Quality::default());
+            let solid = solid.unwrap_or_else(|faults| panic!("{faults:#?}"));
+            (solid.faces.iter().map(|f| f.name.clone()).collect(), solid.volume)
+        };
+        let [least, nominal, most] = [design.lmc(), design.nominal(), design.mmc()].map(|values| made(&values));
+        assert!(least.0 == nominal.0 && most.0 == nominal.0, "{}: {least:?} {nominal:?} {most:?}", part.name);
+        assert!(least.1 < nominal.1 && nominal.1 < most.1, "{}", part.name);
     }
 }
 
