@@ -16,13 +16,28 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 type Faults = Vec<Diagnostic>;
+
+/// Why there is no solid.
+#[derive(Debug)]
+pub(super) enum Failure {
+    /// Whatever the chords.
+    Certain(Faults),
+    /// Chords may cross where their curves do not: shorter ones may help.
+    Coarse(Faults),
+}
+
+impl From<Faults> for Failure {
+    fn from(faults: Faults) -> Self {
+        Failure::Certain(faults)
+    }
+}
 /// A surface with the sense of its faces: (surface, outward).
 type Sheet = (usize, bool);
 /// A loop of (edge, runs forward).
 type Loop = Vec<(usize, bool)>;
 
 /// Traces, groups, measures and checks.
-pub(super) fn build(tree: &mut Tree, mut arrangement: Arrangement, quality: &Quality) -> Result<Solid, Faults> {
+pub(super) fn build(tree: &mut Tree, mut arrangement: Arrangement, quality: &Quality) -> Result<Solid, Failure> {
     check_manifold(tree, &arrangement)?;
     let vertices = compact(&mut arrangement);
     let mut edges: Vec<Edge> =
@@ -32,11 +47,11 @@ pub(super) fn build(tree: &mut Tree, mut arrangement: Arrangement, quality: &Qua
     let mut drafts = Vec::new();
     for (sheet, halves) in sheets(&arrangement.arcs) {
         let loops = trace(tree, &arrangement, sheet, &halves)?;
-        drafts.extend(group(tree, sheet, loops, &edges, vertices.len())?);
+        drafts.extend(group(tree, sheet, loops, &edges, vertices.len()).map_err(Failure::Coarse)?);
     }
     drafts.extend(whole_surfaces(tree, &drafts));
     if drafts.is_empty() {
-        return Err(vec![empty(tree)]);
+        return Err(vec![empty(tree)].into());
     }
     drafts.iter_mut().for_each(|d| d.owner = owner(tree, &arrangement, d));
     drafts.sort_by_key(|d| (d.owner, d.sheet, d.loops.first().and_then(|l| l.first().copied())));

@@ -99,9 +99,17 @@ fn inner_nodes(
     let clearance = step * CLEARANCE;
     let mut nodes = Vec::new();
     for v in rows {
+        let crossings = outline.crossings(v);
+        let [_, y] = point([0.0, v]);
+        let near = |s: &&[[f64; 2]; 2]| {
+            let (low, high) = (s[0][1].min(s[1][1]), s[0][1].max(s[1][1]));
+            low - clearance < y && y < high + clearance
+        };
+        let near: Vec<&[[f64; 2]; 2]> = border.iter().filter(near).collect();
         for u in &columns {
             let uv = [*u, v];
-            if outline.holds(uv) && border.iter().all(|s| distance(point(uv), *s) > clearance) {
+            let inside = crossings.partition_point(|c| c < u) % 2 == 1;
+            if inside && near.iter().all(|s| distance(point(uv), **s) > clearance) {
                 nodes.push(Node { uv, id: fresh(uv) });
             }
         }

@@ -47,28 +47,27 @@ pub fn evaluate(part: &Part, values: &Values, quality: &Quality) -> Result<Solid
     let mut outcome = close(&mut tree, &arrangement, quality);
     // Chords of curves that come near each other, or touch, may cross where the curves do not: shorter ones do not.
     for (chord, angle) in FINER {
-        if !outcome.as_ref().is_err_and(|faults| faults.iter().any(|f| f.code == "E0410")) {
+        if !matches!(outcome, Err(brep::Failure::Coarse(_))) {
             break;
         }
         let finer = Quality { chord: quality.chord * chord, angle: quality.angle * angle };
         outcome = close(&mut tree, &arrangement, &finer).or(outcome);
     }
-    outcome
+    outcome.map_err(|failure| match failure {
+        brep::Failure::Certain(faults) | brep::Failure::Coarse(faults) => faults,
+    })
 }
 
 /// Shares of the quality that are tried when chords are too coarse for a part. The first changes the samples of about half of
 /// all circles, so that two that touch get chords of different angles.
-const FINER: [(f64, f64); 4] = [(0.5, 1.0), (0.25, 0.5), (0.06, 0.5), (0.01, 0.25)];
+const FINER: [(f64, f64); 3] = [(0.5, 1.0), (0.25, 0.5), (0.03, 0.5)];
 
 /// Faces and triangles.
-fn close(
-    tree: &mut csg::Tree,
-    arrangement: &arrange::Arrangement,
-    quality: &Quality,
-) -> Result<Solid, Vec<Diagnostic>> {
+fn close(tree: &mut csg::Tree, arrangement: &arrange::Arrangement, quality: &Quality) -> Result<Solid, brep::Failure> {
     let mut solid = brep::build(tree, arrangement.clone(), quality)?;
     solid.mesh = mesh::triangulate(&solid, quality).map_err(|face| {
-        vec![brep::internal(tree, &format!("`{}` cannot be filled with triangles", solid.faces[face].name))]
+        let what = format!("`{}` cannot be filled with triangles", solid.faces[face].name);
+        brep::Failure::Coarse(vec![brep::internal(tree, &what)])
     })?;
     Ok(solid)
 }

@@ -318,9 +318,19 @@ impl Outline {
         Some(Outline { outer, holes })
     }
 
-    /// True for chart coordinates inside the outer polygon and in no hole.
-    pub fn holds(&self, uv: [f64; 2]) -> bool {
-        encloses(&self.outer, uv) && !self.holes.iter().any(|h| encloses(h, uv))
+    /// The u, ascending, at which the outline crosses the height v: what lies after an odd number of them is inside.
+    pub fn crossings(&self, v: f64) -> Vec<f64> {
+        let mut found = Vec::new();
+        for ring in std::iter::once(&self.outer).chain(&self.holes) {
+            for (i, a) in ring.iter().enumerate() {
+                let (a, b) = (a.uv, ring[(i + 1) % ring.len()].uv);
+                if (a[1] > v) != (b[1] > v) {
+                    found.push(a[0] + (b[0] - a[0]) * (v - a[1]) / (b[1] - a[1]));
+                }
+            }
+        }
+        found.sort_by(f64::total_cmp);
+        found
     }
 }
 
@@ -450,7 +460,7 @@ fn bridge(rings: &[Ring], a: &Ring, b: &Ring) -> Option<(usize, usize)> {
     let clear = |&&(_, i, j): &&(f64, usize, usize)| {
         let p = a.nodes[i].uv;
         let q = [nearest(b.nodes[j].uv[0], p[0], a.period), nearest(b.nodes[j].uv[1], p[1], a.height)];
-        rings.iter().chain([a, b]).all(|r| r.segments().all(|s| !crosses(p, q, s, a.period)))
+        rings.iter().chain([a, b]).all(|r| r.segments().all(|s| !crosses(p, q, s, [a.period, a.height])))
     };
     pairs.iter().take(BRIDGES).find(clear).map(|p| (p.1, p.2))
 }
@@ -528,15 +538,24 @@ fn seam(rings: &[Ring], low: &Ring, high: &Ring) -> Option<(usize, usize)> {
     let clear = |&&(_, b, t): &&(f64, usize, usize)| {
         let a = low.nodes[b].uv;
         let c = [nearest(high.nodes[t].uv[0], a[0], period), high.nodes[t].uv[1]];
-        rings.iter().all(|r| r.segments().all(|s| !crosses(a, c, s, period)))
+        rings.iter().all(|r| r.segments().all(|s| !crosses(a, c, s, [period, r.height])))
     };
     pairs.iter().find(clear).map(|p| (p.1, p.2))
 }
 
 /// Whether segment `s`, moved by whole periods, meets the segment from `a` to `c` other than at its ends.
-fn crosses(a: [f64; 2], c: [f64; 2], s: ([f64; 2], [f64; 2]), period: f64) -> bool {
+fn crosses(a: [f64; 2], c: [f64; 2], s: ([f64; 2], [f64; 2]), [period, height]: [f64; 2]) -> bool {
     let shift = nearest(s.0[0], a[0], period) - s.0[0];
-    let (p, q) = ([s.0[0] + shift, s.0[1]], [s.1[0] + shift, s.1[1]]);
+    let rise = nearest(s.0[1], a[1], height) - s.0[1];
+    let places: &[f64] = if height > 0.0 { &[-1.0, 0.0, 1.0] } else { &[0.0] };
+    places.iter().any(|k| {
+        let moved = |p: [f64; 2]| [p[0] + shift, p[1] + rise + k * height];
+        meets(a, c, moved(s.0), moved(s.1))
+    })
+}
+
+/// Whether two segments meet other than at the ends of the first.
+fn meets(a: [f64; 2], c: [f64; 2], p: [f64; 2], q: [f64; 2]) -> bool {
     let same = |x: [f64; 2], y: [f64; 2]| (x[0] - y[0]).hypot(x[1] - y[1]) < tolerance::WELD;
     if [a, c].iter().any(|e| same(*e, p) || same(*e, q)) {
         return false;

@@ -286,3 +286,54 @@ fn a_torus_may_be_drilled_all_round() {
     let dip = TAU * (0.125 - (PI / 16.0 * 0.5 - 0.125 / 3.0));
     both(&[one("dimple", Op::Add, Shape::Revolve { outline: dimple }, 0.0)], 8.0 * PI - dip);
 }
+
+#[test]
+fn grooves_and_bores_that_meet_have_the_figures_of_open_cascade() {
+    let across = |d: f64, h: f64, t: [f64; 3]| at(cylinder(d, h), t, [0.0, PI / 2.0, 0.0]);
+    let ball = one("ball", Op::Add, ball(16.0), 0.0);
+    let cases = [
+        (
+            vec![
+                ball.clone(),
+                one("groove", Op::Cut, torus(14.0, 5.0), 3.0),
+                feature("bore", Op::Cut, vec![across(3.0, 40.0, [0.0; 3])]),
+            ],
+            1664.8405234,
+            (1, 1, 2, 1),
+        ),
+        (
+            vec![
+                ball.clone(),
+                one("groove", Op::Cut, torus(16.0, 5.0), 0.0),
+                ring_of("hole", Op::Cut, &through(cylinder(2.0, 0.0)), 4, 6.0, 0.0),
+            ],
+            1650.70087,
+            (0, 4, 2, 1),
+        ),
+        (
+            vec![
+                one("ring", Op::Add, torus(20.0, 4.0), 0.0),
+                feature(
+                    "half",
+                    Op::Cut,
+                    vec![at(block(40.0, 40.0, 40.0), [2.0, 0.0, 1.0], [20f64.to_radians(), 0.0, 0.0])],
+                ),
+                ring_of("slot", Op::Cut, &block(8.0, 2.0, 4.0), 3, 10.0, 0.0),
+            ],
+            448.153326766,
+            (9, 0, 0, 1),
+        ),
+        (
+            vec![
+                one("block", Op::Add, block(20.0, 20.0, 10.0), 0.0),
+                feature("point", Op::Cut, vec![at(cone(0.0, 4.0, 4.0), [10.0, 0.0, 6.0], [0.0; 3])]),
+            ],
+            4000.0 - PI * 8.0 / 3.0,
+            (6, 0, 0, 0),
+        ),
+    ];
+    for (features, volume, expected) in cases {
+        let c = both(&features, volume).counts();
+        assert_eq!((c.planes, c.cylinders, c.spheres, c.tori), expected);
+    }
+}
