@@ -57,7 +57,9 @@ pub(super) fn trace(
     let walk = Walk { surfaces, nodes: &search.nodes, room: &room };
     let mut curves: Vec<Traced> = Vec::new();
     for seed in &search.seeds {
-        if curves.iter().any(|c| (c.at(c.parameter(seed)) - seed).norm() < tolerance::WELD) {
+        // Near a node the nearest chord may be another branch's.
+        let passes = |c: &Traced| c.passages(seed).iter().any(|t| (c.at(*t) - seed).norm() < tolerance::WELD);
+        if curves.iter().any(passes) {
             continue;
         }
         curves.extend(walk.from(seed)?);
@@ -257,9 +259,12 @@ impl Walk<'_> {
         let mut places = vec![start];
         for _ in 0..MOST_STEPS {
             let here = places[places.len() - 1];
-            if let Some(last) = self.node_ahead(&here, step) {
-                places.push(last);
-                return Ok((places, End::Out));
+            if let Some(node) = self.node_ahead(&here, step) {
+                if let Some(last) = self.reach(&here, node) {
+                    places.push(last);
+                    return Ok((places, End::Out));
+                }
+                step = step.min((node - here.0).norm() / 2.0);
             }
             match self.step(&here, step) {
                 Some((next, stray)) => {
@@ -325,19 +330,22 @@ impl Walk<'_> {
             && self.stray(here, start).is_some()
     }
 
-    /// A node at most a step and a half ahead that the curve runs into.
-    fn node_ahead(&self, here: &Place, step: f64) -> Option<Place> {
+    /// A node at most two steps ahead that the curve runs towards.
+    fn node_ahead(&self, here: &Place, step: f64) -> Option<&Point3<f64>> {
         let ahead = |node: &&Point3<f64>| {
             let to = *node - here.0;
             let far = to.norm();
-            far > 0.0 && far <= 1.5 * step && to.dot(&here.1) > 0.97 * far
+            far > 0.0 && far <= 2.0 * step && to.dot(&here.1) > 0.97 * far
         };
-        let node = self.nodes.iter().find(ahead)?;
+        self.nodes.iter().find(ahead)
+    }
+
+    /// The last step, into a node; `None` when it is too long. The surfaces touch there and tell no direction: the tangent is
+    /// what an arc through both places would have.
+    fn reach(&self, here: &Place, node: &Point3<f64>) -> Option<Place> {
         let chord = (node - here.0).normalize();
-        // The tangent there is what an arc through both places would have.
         let tangent = chord * (2.0 * chord.dot(&here.1)) - here.1;
-        let middle = cubic((&here.0, &here.1), (node, &tangent), 0.5).0;
-        let near = self.surfaces.iter().all(|s| s.distance(&middle).abs() < STRAIGHT.1);
-        near.then_some((*node, tangent))
+        let last = (*node, tangent);
+        self.stray(here, &last).map(|_| last)
     }
 }

@@ -337,3 +337,33 @@ fn grooves_and_bores_that_meet_have_the_figures_of_open_cascade() {
         assert_eq!((c.planes, c.cylinders, c.spheres, c.tori), expected);
     }
 }
+
+#[test]
+fn bores_that_touch_from_inside_have_the_figures_of_open_cascade() {
+    let x = |d: f64, h: f64, t: [f64; 3]| at(cylinder(d, h), t, [0.0, PI / 2.0, 0.0]);
+    let touching = vec![
+        one("bar", Op::Add, cylinder(20.0, 16.0), 0.0),
+        one("bore", Op::Cut, cylinder(10.0, 16.0), 0.0),
+        feature("across", Op::Cut, vec![at(through(cylinder(4.0, 0.0)), [3.0, 0.0, 5.0], [0.0, PI / 2.0, 0.0])]),
+        feature("aside", Op::Cut, vec![at(cylinder(4.0, 10.0), [3.0, 2.0, 8.0], [PI / 2.0, 0.0, 0.0])]),
+        feature("along", Op::Cut, vec![at(through(cylinder(4.0, 0.0)), [0.0, 2.0, 4.0], [0.0; 3])]),
+    ];
+    let c = both(&touching, 3589.38451119).counts();
+    assert_eq!((c.planes, c.cylinders, c.edges, c.corners), (4, 6, 14, 3));
+    let rings = vec![
+        one("disc", Op::Add, cylinder(16.0, 4.0), -2.0),
+        one("rim", Op::Add, torus(16.0, 4.0), 0.0),
+        one("groove", Op::Cut, torus(16.0, 2.0), -2.0),
+        ring_of("hole", Op::Cut, &through(cylinder(2.0, 0.0)), 4, 8.0, 0.0),
+    ];
+    let c = both(&rings, 1040.06556511).counts();
+    assert_eq!((c.planes, c.cylinders, c.tori, c.edges, c.corners), (2, 4, 5, 32, 20));
+    let halved = vec![
+        one("ball", Op::Add, ball(16.0), 0.0),
+        one("groove", Op::Cut, torus(12.0, 5.0), 3.0),
+        feature("half", Op::Cut, vec![at(block(40.0, 40.0, 40.0), [0.0, 20.0, -20.0], [0.0; 3])]),
+        feature("bore", Op::Cut, vec![x(3.0, 40.0, [0.0, 0.0, 4.0])]),
+    ];
+    let c = both(&halved, 786.469354866).counts();
+    assert_eq!((c.planes, c.cylinders, c.spheres, c.tori), (2, 1, 2, 1));
+}
