@@ -6,7 +6,7 @@
 use super::polar::Polar;
 use super::seam::{Foot, Plan, Seam, Seamstress};
 use super::track::Track;
-use crate::solid::Solid;
+use crate::solid::{Solid, Surface};
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 
@@ -110,8 +110,9 @@ impl<'a> Tailor<'a> {
         if let (Some([u, v]), Some(polar)) = (plan.square, &plan.polar) {
             loops.splice(0..0, self.square(polar, u, v, solid.faces[face].outward));
         }
-        // A whole sphere needs no loop: formats have a word for it.
-        if !(loops.is_empty() && plan.seams.len() == 1) {
+        // A whole sphere needs no loop: formats have a word for it, which readers know of spheres only.
+        let sphere = matches!(solid.surface(face), Surface::Sphere { .. });
+        if !(sphere && loops.is_empty()) {
             self.sew(&mut loops, &plan);
         }
         Panel { face, polar: plan.polar, loops }
