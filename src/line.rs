@@ -154,6 +154,7 @@ impl<'a> Line<'a> {
         self.emit(Artifact::ErrorTrees, || artifacts::error_trees(design, trees));
         self.emit(Artifact::ObjectTree, || artifacts::object_tree(design, trees));
         self.emit(Artifact::Insertion, || artifacts::insertion(design, solids, analysis));
+        self.emit(Artifact::Measures, || artifacts::measures(analysis));
         self.emit_files(Artifact::Gltf, || artifacts::exchange::gltf(design, solids, analysis));
         self.emit_files(Artifact::Liaison, || pictures::liaison(design, solids, analysis));
         self.emit_files(Artifact::ErrorTrees, || pictures::error_trees(design, solids, analysis, trees));

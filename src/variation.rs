@@ -3,8 +3,9 @@
 //! In: a [`Design`], a seed and the number of an image. Out: one value per dimension. Every dimension has its own stream,
 //! named after it, so an edit to one dimension leaves the draws of all others as they were. Never looks at geometry.
 
-use crate::design::model::{Design, Dimension, Expr};
+use crate::design::model::{Design, DimId, Dimension, Expr};
 use crate::rng::Stream;
+use crate::units::Range;
 use std::f64::consts::PI;
 
 /// One value per dimension (mm, rad), indexed by [`crate::design::model::DimId`].
@@ -17,8 +18,31 @@ pub fn draw(design: &Design, seed: u64, image: u64) -> Vec<f64> {
     design.dims.iter().zip(turns).map(|(d, turn)| draw_one(d, turn, uniform, seed, image)).collect()
 }
 
+/// One dimension's value in the draw of that number: what [`draw`] gives it.
+pub fn draw_of(design: &Design, dim: DimId, free_turn: bool, image: u64) -> f64 {
+    let train = &design.train;
+    draw_one(&design.dims[dim.0 as usize], free_turn, train.uniform, train.seed, image)
+}
+
+/// The value below which a dimension stays with this probability (0..1).
+pub fn quantile(design: &Design, dim: DimId, free_turn: bool, u: f64) -> f64 {
+    let Range { low, nominal, high } = design.dims[dim.0 as usize].range;
+    if free_turn {
+        return nominal + PI * (2.0 * u - 1.0);
+    }
+    if design.train.uniform || high <= low {
+        return low + (high - low) * u;
+    }
+    let split = (nominal - low) / (high - low);
+    if u < split {
+        low + ((high - low) * (nominal - low) * u).sqrt()
+    } else {
+        high - ((high - low) * (high - nominal) * (1.0 - u)).sqrt()
+    }
+}
+
 /// Marks the dimensions that are a free turn of some component.
-fn free_turns(design: &Design) -> Vec<bool> {
+pub fn free_turns(design: &Design) -> Vec<bool> {
     let mut free = vec![false; design.dims.len()];
     for component in &design.components {
         for axis in 0..3 {
@@ -72,6 +96,35 @@ mod tests {
         let after = draw(&edited, 3, 5);
         assert_eq!(before[1..], after[1..]);
         assert_ne!(before[0], after[0]);
+    }
+
+    #[test]
+    fn one_dimension_is_drawn_as_all_are() {
+        let mut design = sample::pattern_wheel().design;
+        for uniform in [true, false] {
+            design.train.uniform = uniform;
+            let free = free_turns(&design);
+            let all = draw(&design, design.train.seed, 4);
+            let dims = (0..design.dims.len()).map(|i| DimId(i as u32));
+            let each: Vec<f64> = dims.map(|d| draw_of(&design, d, free[d.0 as usize], 4)).collect();
+            assert_eq!(all, each);
+        }
+    }
+
+    #[test]
+    fn quantiles_are_those_of_the_draws() {
+        let mut design = sample::pattern_wheel().design;
+        for uniform in [true, false] {
+            design.train.uniform = uniform;
+            let n = 2000;
+            let mut drawn: Vec<f64> = (0..n).map(|k| draw_of(&design, DimId(0), false, k)).collect();
+            drawn.sort_by(f64::total_cmp);
+            let width = design.dims[0].range.high - design.dims[0].range.low;
+            for share in [0.1, 0.3, 0.5, 0.8] {
+                let found = drawn[(share * n as f64) as usize];
+                assert!((found - quantile(&design, DimId(0), false, share)).abs() < 0.04 * width);
+            }
+        }
     }
 
     #[test]

@@ -38,6 +38,7 @@ pub enum Artifact {
     ErrorTrees,
     ObjectTree,
     Insertion,
+    Measures,
     Gltf,
     Exploded,
     View,
@@ -46,7 +47,7 @@ pub enum Artifact {
 }
 
 impl Artifact {
-    pub const ALL: [Artifact; 13] = [
+    pub const ALL: [Artifact; 14] = [
         Artifact::Design,
         Artifact::Brep,
         Artifact::Step,
@@ -55,6 +56,7 @@ impl Artifact {
         Artifact::ErrorTrees,
         Artifact::ObjectTree,
         Artifact::Insertion,
+        Artifact::Measures,
         Artifact::Gltf,
         Artifact::Exploded,
         Artifact::View,
@@ -73,6 +75,7 @@ impl Artifact {
             Artifact::ErrorTrees => "error-trees",
             Artifact::ObjectTree => "object-tree",
             Artifact::Insertion => "insertion",
+            Artifact::Measures => "measures",
             Artifact::Gltf => "gltf",
             Artifact::Exploded => "exploded",
             Artifact::View => "view",
@@ -95,6 +98,7 @@ impl Artifact {
             | Artifact::ErrorTrees
             | Artifact::ObjectTree
             | Artifact::Insertion
+            | Artifact::Measures
             | Artifact::Gltf
             | Artifact::Exploded => Stage::Assembly,
             Artifact::View | Artifact::Images => Stage::View,
@@ -335,6 +339,11 @@ pub fn object_tree(design: &Design, trees: &[ErrorTree]) -> String {
     };
     let trees = trees.iter().map(|t| (name(t.nodes[0].component).to_string(), levels(t))).collect();
     ron(2, &Named(vec![(design.name.clone(), Named(trees))]))
+}
+
+/// Every measured distance: nominal, worst case, distribution, contributors.
+pub fn measures(analysis: &Analysis) -> String {
+    format!("// lengths in mm; sensitivity in mm per mm or per rad\n{}", ron(4, &analysis.measures))
 }
 
 #[derive(Serialize)]

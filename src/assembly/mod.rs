@@ -8,6 +8,7 @@ pub mod error_tree;
 pub mod fault;
 pub mod insertion;
 pub mod liaison;
+pub mod measure;
 pub mod piece;
 pub mod place;
 pub mod turn;
@@ -27,6 +28,7 @@ mod rest;
 pub(crate) mod sample;
 mod sides;
 mod silhouette;
+mod stack;
 mod tangent;
 mod tight;
 
@@ -40,15 +42,20 @@ use std::sync::Arc;
 pub struct Analysis {
     pub liaison: liaison::Liaison,
     pub insertion: insertion::Insertion,
+    /// In the order of [`Design::measures`], those left out that are wrong.
+    pub measures: Vec<measure::Measured>,
 }
 
-/// Contacts, liaisons and insertion order at nominal, and what is wrong with them (E0501, W0502, E0503).
+/// Contacts, liaisons and insertion order at nominal, and what is wrong with them (E0501, W0502, E0503) or with its
+/// measures (E0506, W0507, E0508, E0509).
 /// `solids` holds one solid per component at nominal, in its part's frame.
 pub fn analyse(design: &Design, solids: &[Arc<Solid>]) -> (Analysis, Vec<Diagnostic>) {
     let found = contact::find(design, solids);
     let liaison = liaison::Liaison::with_tangents(design.components.len(), found.contacts, found.tangents);
     let (insertion, entering) = insertion::take_apart(design, solids, &liaison);
     let seen = check::Seen { liaison: &liaison, clashes: &found.clashes, entering: &entering, tight: &found.tight };
-    let diagnostics = check::check(design, solids, &seen);
-    (Analysis { liaison, insertion }, diagnostics)
+    let mut diagnostics = check::check(design, solids, &seen);
+    let (measures, faults) = measure::measures(design, solids);
+    diagnostics.extend(faults);
+    (Analysis { liaison, insertion, measures }, diagnostics)
 }

@@ -149,6 +149,13 @@ impl<'a> Joint<'a> {
         self.varying(dims)
     }
 
+    /// As [`Joint::dims`], free axes too.
+    pub fn dims_with_free(&self) -> Vec<DimId> {
+        let mut dims = self.dims();
+        self.branches.iter().flatten().for_each(|c| pose_dims(&self.design.components[*c].pose, &mut dims));
+        self.varying(dims)
+    }
+
     /// Those that vary, each once, in the design's order.
     pub fn varying(&self, mut dims: Vec<DimId>) -> Vec<DimId> {
         dims.retain(|d| varies(self.design, *d));
