@@ -9,6 +9,9 @@ use gonogo::solid::{Quality, Solid, evaluate};
 use nalgebra::{Point3, Vector3};
 use std::sync::Arc;
 
+#[path = "../benches/towers/mod.rs"]
+mod towers;
+
 struct Wheel {
     design: Design,
     solids: Vec<Arc<Solid>>,
@@ -113,5 +116,21 @@ fn every_watched_component_can_be_missing_or_not_seated() {
     for watch in &wheel.design.inspect.watch {
         let kinds: Vec<FaultKind> = modes.iter().filter(|m| m.component == watch.component).map(|m| m.kind).collect();
         assert_eq!(kinds[..2], [FaultKind::Missing, FaultKind::NotSeated], "{}", wheel.name(watch.component));
+    }
+}
+
+/// What every generated size has to show; the figures of a thousand components are in `benches/assembly.rs`.
+#[test]
+fn towers_of_plates_and_pins_are_analysed_in_full() {
+    for (towers, plates, columns, rows) in [(1, 2, 2, 1), (3, 4, 3, 2)] {
+        let size = towers::Size { towers, plates, columns, rows };
+        let (design, solids) = towers::build(size);
+        let (analysis, diagnostics) = analyse(&design, &solids);
+        assert_eq!(design.components.len(), size.components());
+        assert_eq!(analysis.liaison.contacts.len(), size.contacts());
+        assert_eq!(diagnostics, []);
+        assert_eq!(analysis.insertion.common, Some([0.0, 0.0, 1.0]));
+        assert_eq!(analysis.insertion.rounds.len(), plates, "{:?}", analysis.insertion.rounds);
+        assert_eq!(analysis.insertion.rounds[0].len(), towers * (columns * rows + 1), "pins and the highest plates");
     }
 }
