@@ -296,6 +296,10 @@ mod tests {
         shop.place("plate", plate, [0.0, 0.0, 3.0], 0.0, 0.0);
         shop.place("rivet", rivet, [0.0, 0.0, 1.0], 0.0, 0.0);
         let found = analyse(&shop.finish());
-        assert_eq!((found.common, found.locked), (None, vec![1, 2]));
+        assert_eq!((found.common, &found.locked), (None, &vec![1, 2]));
+        assert_eq!(found.groups.len(), 1, "both leave together");
+        assert_eq!((&found.groups[0].members, found.groups[0].rounds.len()), (&vec![1, 2], 0));
+        let along = |d: [f64; 3]| found.held.iter().filter(move |h| h.direction == d).map(|h| h.by.clone());
+        assert_eq!(along([0.0, 0.0, 1.0]).collect::<Vec<_>>(), [[2], [1]]);
     }
 }

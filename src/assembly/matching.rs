@@ -166,3 +166,64 @@ impl Gauge {
 fn pierce(point: &Point3<f64>, axis: &Vector3<f64>, p: &Point3<f64>, d: &Vector3<f64>) -> Point3<f64> {
     point + axis * ((p - point).dot(d) / axis.dot(d))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gauge(kind: ContactKind, probes: Vec<Point3<f64>>) -> Gauge {
+        Gauge { kind, direction: Vector3::z_axis(), probes, sign: 1.0 }
+    }
+
+    fn cone(z: f64, x: f64, half_angle: f64) -> Surface {
+        Surface::Cone { apex: Point3::new(x, 0.0, z), axis: Vector3::z_axis(), half_angle }
+    }
+
+    /// Drawn apart along the axis by h, the flanks are h sin α apart.
+    #[test]
+    fn cones_part_by_the_sine_of_their_half_angle() {
+        let (angle, h) = (0.4f64, 0.3);
+        let gauge = gauge(ContactKind::Cone, vec![Point3::new(0.0, 0.0, 5.0), Point3::new(0.0, 0.0, 9.0)]);
+        let lies = gauge.lies(&cone(0.0, 0.0, angle), &cone(-h, 0.0, angle));
+        assert!(lies.iter().all(|l| (l.margin() - h * angle.sin()).abs() < 1e-12), "{lies:?}");
+        assert!((gauge.drawn(&lies).unwrap() - h * angle.sin()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_wider_cone_gapes_with_its_distance_from_the_apex() {
+        let (a, b) = (0.4f64, 0.41f64);
+        let gauge = gauge(ContactKind::Cone, vec![Point3::new(0.0, 0.0, 5.0), Point3::new(0.0, 0.0, 9.0)]);
+        let lies = gauge.lies(&cone(0.0, 0.0, a), &cone(0.0, 0.0, b));
+        for (lie, h) in lies.iter().zip([5.0, 9.0]) {
+            assert!((lie.gap - h * (b.tan() - a.tan()) * a.cos()).abs() < 1e-12);
+        }
+        // Beside each other the flanks meet where the offset points, by its share square to them.
+        let beside = gauge.lies(&cone(0.0, 0.0, a), &cone(0.0, 0.02, a));
+        assert!((beside[0].margin() + 0.02 * a.cos()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn tubes_part_by_their_radii_less_what_their_circles_miss_by() {
+        let torus = |x: f64, major: f64, minor: f64| Surface::Torus {
+            centre: Point3::new(x, 0.0, 0.0),
+            axis: Vector3::z_axis(),
+            major,
+            minor,
+        };
+        let gauge = gauge(ContactKind::Torus, vec![Point3::origin()]);
+        let lies = gauge.lies(&torus(0.0, 10.0, 2.0), &torus(0.03, 10.05, 2.2));
+        assert!((lies[0].gap - 0.15).abs() < 1e-12 && (lies[0].margin() - 0.12).abs() < 1e-12, "{lies:?}");
+    }
+
+    #[test]
+    fn cylinders_that_lean_meet_at_the_ends() {
+        let cylinder = |lean: f64, radius: f64| Surface::Cylinder {
+            point: Point3::origin(),
+            axis: Unit::new_normalize(Vector3::new(lean, 0.0, 1.0)),
+            radius,
+        };
+        let gauge = gauge(ContactKind::Cylinder, vec![Point3::origin(), Point3::new(0.0, 0.0, 10.0)]);
+        let lies = gauge.lies(&cylinder(0.0, 3.0), &cylinder(0.001, 3.02));
+        assert!((lies[0].margin() - 0.02).abs() < 1e-12 && (lies[1].margin() - 0.01).abs() < 1e-12, "{lies:?}");
+    }
+}

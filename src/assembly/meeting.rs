@@ -207,4 +207,36 @@ mod tests {
         let meetings = Meetings::new(Vector3::z_axis(), &a.solids, &place(&a.design, &a.design.nominal()));
         assert!(meetings.entering.is_empty(), "{:?}", meetings.entering);
     }
+
+    /// A wall 0.2 mm thick over a block, and a block under it that the columns' cells are too coarse for.
+    #[test]
+    fn a_thin_wall_stands_in_the_way() {
+        use crate::design::model::{Expr, Extent, Op, Shape};
+        let cuboid = |x: f64, y: f64, z: f64| {
+            let [x, y, z] = [x, y, z].map(Expr::Const);
+            Shape::Box { x, y, z: Extent::Length(z) }
+        };
+        let mut shop = sample::Shop::default();
+        let block = shop.made_of("block", vec![("slab", Op::Add, cuboid(40.0, 30.0, 5.0), [0.0; 3])]);
+        let wall = shop.made_of("wall", vec![("slab", Op::Add, cuboid(0.2, 30.0, 5.0), [0.0; 3])]);
+        shop.place("block", block, [0.0; 3], 0.0, 0.0);
+        shop.place("wall", wall, [3.3, 1.0, 50.0], 0.0, 0.0);
+        let a = shop.finish();
+        let meetings = Meetings::new(Vector3::z_axis(), &a.solids, &place(&a.design, &a.design.nominal()));
+        assert_eq!(meetings.way, [vec![1], vec![]]);
+    }
+
+    #[test]
+    fn pairs_that_stand_alike_meet_alike() {
+        let mut shop = sample::Shop::default();
+        let plate = shop.plate("plate", [2.0, 0.0], [20.0, 0.0], &[]);
+        for k in 0..5 {
+            shop.place(&format!("plate_{k}"), plate, [0.25 * k as f64, 0.0, 2.0 * k as f64], 0.0, 0.0);
+        }
+        let a = shop.finish();
+        let meetings = Meetings::new(Vector3::z_axis(), &a.solids, &place(&a.design, &a.design.nominal()));
+        for (k, way) in meetings.way.iter().enumerate() {
+            assert_eq!(*way, (k + 1..5).collect::<Vec<_>>());
+        }
+    }
 }

@@ -124,6 +124,23 @@ impl Shop {
         self.part(name, features)
     }
 
+    /// A part of primitives: name, operation, shape, place; returns the part's index.
+    pub fn made_of(&mut self, name: &str, features: Vec<(&str, Op, Shape, [f64; 3])>) -> usize {
+        let feature = |(name, op, shape, at): (&str, Op, Shape, [f64; 3])| feature(name, op, copy(shape, at, 0.0));
+        let features = features.into_iter().map(feature).collect();
+        self.part(name, features)
+    }
+
+    /// A zone (mm or rad, both ways) on an axis of a placed component that has none: x, y, z, rx, ry, rz.
+    pub fn vary(&mut self, component: usize, axis: usize, zone: f64) {
+        let name = format!("{}.{}", self.components[component].name, ["x", "y", "z", "rx", "ry", "rz"][axis]);
+        let pose = &self.components[component].pose;
+        let nominal = if axis < 3 { pose.t[axis].eval(&[]) } else { pose.r[axis - 3].eval(&[]) };
+        let expr = self.dim(name, nominal, [-zone, zone], Sense::Neutral);
+        let pose = &mut self.components[component].pose;
+        if axis < 3 { pose.t[axis] = expr } else { pose.r[axis - 3] = expr }
+    }
+
     /// A component at x, y, z of the root's frame with zones on z (mm) and about z (rad).
     pub fn place(&mut self, name: &str, part: usize, at: [f64; 3], z_zone: f64, rz_zone: f64) -> usize {
         let mut pose = PoseExpr { t: at.map(Expr::Const), ..PoseExpr::identity() };
