@@ -16,7 +16,9 @@ pub(crate) struct Body {
     pub solid: Arc<Solid>,
     pub faces: Vec<PlacedFace>,
     pub bounds: Bounds,
-    pose: Isometry3<f64>,
+    pub pose: Isometry3<f64>,
+    /// Which solid it is: bodies of one number differ by their pose only.
+    pub number: usize,
     blank: Arc<Blank>,
 }
 
@@ -43,6 +45,8 @@ struct BlankFace {
     ring: Option<[f64; 2]>,
 }
 
+/// Stances that differ by less than this (mm, or half an angle in rad) are one.
+const SAME_STANCE: f64 = 1e-9;
 /// Faces with more triangles than this are searched by a tree.
 const MANY: usize = 256;
 /// Circles whose axis differs from a cylinder's by less than this (sine) are square to it.
@@ -50,16 +54,17 @@ const SQUARE: f64 = 1e-9;
 
 /// One body per component.
 pub(crate) fn placed(solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Vec<Body> {
-    let mut blanks: BTreeMap<*const Solid, Arc<Blank>> = BTreeMap::new();
+    let mut blanks: BTreeMap<*const Solid, (usize, Arc<Blank>)> = BTreeMap::new();
     let body = |(solid, pose): (&Arc<Solid>, &Isometry3<f64>)| {
-        let blank = blanks.entry(Arc::as_ptr(solid)).or_insert_with(|| Arc::new(Blank::new(solid))).clone();
-        Body::new(solid, pose, blank)
+        let number = blanks.len();
+        let make = || (number, Arc::new(Blank::new(solid)));
+        Body::new(solid, pose, blanks.entry(Arc::as_ptr(solid)).or_insert_with(make).clone())
     };
     solids.iter().zip(poses).map(body).collect()
 }
 
 impl Body {
-    fn new(solid: &Arc<Solid>, pose: &Isometry3<f64>, blank: Arc<Blank>) -> Self {
+    fn new(solid: &Arc<Solid>, pose: &Isometry3<f64>, (number, blank): (usize, Arc<Blank>)) -> Self {
         let shifted_only = pose.rotation.angle() == 0.0;
         let place = |(face, own): (&Face, &BlankFace)| {
             let by = pose.translation.vector;
@@ -78,7 +83,19 @@ impl Body {
         };
         let faces: Vec<PlacedFace> = solid.faces.iter().zip(&blank.faces).map(place).collect();
         let bounds = faces.iter().fold(Bounds::EMPTY, |b, f| b.around(&f.bounds));
-        Body { solid: solid.clone(), faces, bounds, pose: *pose, blank }
+        Body { solid: solid.clone(), faces, bounds, pose: *pose, number, blank }
+    }
+
+    /// Whether a face has so many triangles that laying them over others' is work.
+    pub fn is_broad(&self, face: usize) -> bool {
+        self.blank.faces[face].tree.is_some()
+    }
+
+    /// How another body stands to this one, to within rounding.
+    pub fn stance(&self, other: &Body) -> [i64; 7] {
+        let between = self.pose.inv_mul(&other.pose);
+        let (t, r) = (between.translation.vector, between.rotation.coords);
+        [t.x, t.y, t.z, r.x, r.y, r.z, r.w].map(|v| (v / SAME_STANCE).round() as i64)
     }
 
     /// The triangles of a face that come near a box, in the assembly's frame.

@@ -17,7 +17,7 @@ use crate::design::model::Design;
 use crate::solid::{Solid, Surface};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -206,7 +206,12 @@ struct Survey<'a> {
     /// MMC and LMC.
     limits: [Vec<f64>; 2],
     found: Found,
+    /// Regions that broad faces share, in the first body's frame, by the faces and how the bodies stand to each other.
+    known: BTreeMap<Alike, Option<Common>>,
 }
+
+/// Two solids by number with a face each, and the stance of the second.
+type Alike = (usize, usize, usize, usize, [i64; 7]);
 
 /// Two faces of two components.
 type Pair<'a> = [(FaceRef, &'a PlacedFace); 2];
@@ -216,7 +221,15 @@ impl<'a> Survey<'a> {
         let values = design.nominal();
         let poses = place(design, &values);
         let bodies = placed(solids, &poses);
-        Survey { design, bodies, poses, values, limits: [design.mmc(), design.lmc()], found: Found::default() }
+        Survey {
+            design,
+            bodies,
+            poses,
+            values,
+            limits: [design.mmc(), design.lmc()],
+            found: Found::default(),
+            known: BTreeMap::new(),
+        }
     }
 
     fn between(&mut self, pair: [usize; 2]) {
@@ -249,12 +262,28 @@ impl<'a> Survey<'a> {
         if !near && !eccentric {
             return;
         }
-        let Some(common) = Common::of(pair, bodies, &candidate) else { return };
+        let Some(common) = self.common(pair, bodies, &candidate) else { return };
         if near {
             self.contact(pair, bodies, &candidate, &common, joint);
         } else {
             self.found.clashes.push(Clash { a, b, depth: candidate.miss() });
         }
+    }
+
+    /// The region two faces share; of broad planes that lie to each other as another pair did, what that pair shares.
+    fn common(&mut self, pair: Pair, bodies: [&Body; 2], c: &Candidate) -> Option<Common> {
+        let [a, b] = [0, 1].map(|k| (bodies[k], pair[k].0.face));
+        let broad = c.kind == ContactKind::Plane && a.0.is_broad(a.1) && b.0.is_broad(b.1);
+        if !broad {
+            return Common::of(pair, bodies, c);
+        }
+        let key = (a.0.number, a.1, b.0.number, b.1, a.0.stance(b.0));
+        let known = match self.known.get(&key) {
+            Some(known) => known.clone(),
+            None => Common::of(pair, bodies, c).map(|common| common.carried(&a.0.pose.inverse())),
+        };
+        self.known.insert(key, known.clone());
+        known.map(|common| common.carried(&a.0.pose))
     }
 
     /// Whether the surfaces coincide, as nearly as the placement zones at that point can make up for.
@@ -279,7 +308,7 @@ impl<'a> Survey<'a> {
             direction: c.direction,
             point: if c.kind == ContactKind::Plane { on_plane } else { c.point },
             area: common.area,
-            span: common.span,
+            span: if c.kind == ContactKind::Plane { [on_plane.coords.dot(&c.direction); 2] } else { common.span },
             gap: c.gap,
             gap_range: [c.gap; 2],
             play: [c.gap; 2],
@@ -338,6 +367,7 @@ fn slope(surface: &Surface) -> f64 {
 }
 
 /// The region two faces share.
+#[derive(Debug, Clone)]
 struct Common {
     area: f64,
     /// Along the candidate's direction, from the assembly's origin (mm).
@@ -365,6 +395,11 @@ impl Common {
         };
         let span = common.reach.map(|h| base + chart.along_axis(h));
         (common.area >= LEAST_AREA).then_some(Common { area: common.area, span, arc: common.arc, outline })
+    }
+
+    /// The region of two planes after a motion.
+    fn carried(&self, by: &Isometry3<f64>) -> Common {
+        Common { outline: self.outline.iter().map(|p| by * p).collect(), ..self.clone() }
     }
 
     /// Cylinders whole all the way round share a stretch of the axis.

@@ -5,6 +5,7 @@
 //! and spheres Lambert's cylindrical equal-area map and its like), where the triangles of a face do not overlap each
 //! other: so the common area is the plain sum over pairs of triangles. Exact for planes and cylinders up to the facets.
 
+use super::boxes::{Bounds, BoxTree};
 use crate::solid::Surface;
 use nalgebra::{Point3, Unit, Vector3};
 use std::f64::consts::{PI, TAU};
@@ -150,17 +151,17 @@ pub(crate) fn square_to(w: Unit<Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
 pub(crate) fn overlap(a: &[Flat], b: &[Flat], periods: [Option<f64>; 2]) -> Option<Overlap> {
     let turns = periods.map(|p| p.map_or(vec![0.0], |p| vec![-p, 0.0, p]));
     let mut total = Overlap::NONE;
-    let mut sorted: Vec<(f64, f64, &Flat)> = b.iter().map(|t| (low(t, 0), high(t, 0), t)).collect();
-    sorted.sort_by(|p, q| p.0.total_cmp(&q.0));
-    let widest = sorted.iter().map(|(l, h, _)| h - l).fold(0.0, f64::max);
+    let boxed = |t: &Flat| Bounds {
+        low: Vector3::new(low(t, 0), low(t, 1), 0.0),
+        high: Vector3::new(high(t, 0), high(t, 1), 0.0),
+    };
+    let tree = BoxTree::new(b.iter().map(boxed).collect());
     let ways = ways();
     for (turn, s) in turns[0].iter().flat_map(|turn| a.iter().map(move |s| (turn, s))) {
         for rise in &turns[1] {
             let shifted = s.map(|[x, y]| [x + turn, y + rise]);
-            let from = sorted.partition_point(|(l, ..)| *l < low(&shifted, 0) - widest);
-            let to = sorted.partition_point(|(l, ..)| *l < high(&shifted, 0));
-            for (.., t) in &sorted[from..to.max(from)] {
-                total.add(&shifted, t, &ways);
+            for t in tree.meeting(&boxed(&shifted)) {
+                total.add(&shifted, &b[t], &ways);
             }
         }
     }

@@ -121,15 +121,19 @@ struct Corner {
     probe: Vec<[Lie; 2]>,
 }
 
+/// Directions of single limits that the search starts from, at most.
+const MOST_STARTS: usize = 24;
 /// Most rounds of the search from one start; each can only make the corner worse.
 const ROUNDS: usize = 8;
 
 /// For a direction of the offset the worst limit of every dimension is known, and these limits give the offset a new
-/// direction: repeated from every direction that one dimension alone moves it.
+/// direction: repeated from every direction that one dimension alone moves it, and two together do.
 fn worst(still: Lie, moves: &[[Lie; 2]]) -> Corner {
-    let offsets = moves.iter().flatten().map(|l| l.offset).chain([still.offset]);
-    let mut starts: Vec<Vector3<f64>> = offsets.filter_map(|o| o.try_normalize(NOTHING)).collect();
-    starts.push(Vector3::zeros());
+    let offsets: Vec<Vector3<f64>> =
+        moves.iter().flatten().map(|l| l.offset).filter(|o| o.norm() > NOTHING).take(MOST_STARTS).collect();
+    let two = offsets.iter().enumerate().flat_map(|(i, p)| offsets[..i].iter().map(move |q| p + q));
+    let starts = offsets.iter().copied().chain([still.offset]).chain(two).filter_map(|o| o.try_normalize(NOTHING));
+    let starts: Vec<Vector3<f64>> = starts.chain([Vector3::zeros()]).collect();
     let corners = starts.into_iter().map(|start| {
         let mut corner = towards(still, moves, start);
         for _ in 0..ROUNDS {

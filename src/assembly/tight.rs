@@ -138,10 +138,11 @@ impl Case<'_> {
 
     /// The limit that alone leaves no interference: of a placement if one will do, else of a size.
     fn cure(&self, design: &Design) -> Option<String> {
-        let alone = |s: &&Share| s.loss > self.missing + SAME;
-        let placed = self.shares.iter().filter(alone).find(|s| self.axes.contains_key(&s.dim));
-        let share = placed.or_else(|| self.shares.iter().find(alone))?;
-        let kept = 1.0 - self.missing / share.loss;
+        let placed = |s: &&Share| self.axes.contains_key(&s.dim);
+        let zone = self.shares.iter().filter(placed).find(|s| s.loss > self.missing + SAME);
+        let size = || self.shares.iter().filter(|s| !placed(s)).find(|s| s.loss > self.missing - SAME);
+        let share = zone.or_else(size)?;
+        let kept = (1.0 - self.missing / share.loss).max(0.0);
         let dim = &design.dims[share.dim.0 as usize];
         let axis = self.axes.get(&share.dim).map(|(_, axis)| *axis);
         let turns = dim.quantity == Quantity::Angle || axis.is_some_and(|a| a >= 3);
