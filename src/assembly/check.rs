@@ -31,7 +31,7 @@ pub(crate) struct Seen<'a> {
 pub(crate) fn check(design: &Design, solids: &[Arc<Solid>], seen: &Seen) -> Vec<Diagnostic> {
     let mut found = interference(design, solids, seen);
     found.extend(tight::warnings(design, solids, seen.liaison, seen.tight));
-    found.extend(untouched(design, solids, seen.liaison));
+    found.extend(untouched(design, solids, seen));
     found
 }
 
@@ -95,9 +95,13 @@ fn diameter(solids: &[Arc<Solid>], f: FaceRef) -> Option<f64> {
 /// What is nearer than this (mm, the facets of curved faces) touches after all, if only along a line or in a point.
 const LINE_CONTACT: f64 = 0.02;
 
-/// E0503 for every component but the root that touches nothing.
-fn untouched(design: &Design, solids: &[Arc<Solid>], liaison: &Liaison) -> Vec<Diagnostic> {
-    let lonely: Vec<usize> = (1..liaison.components).filter(|c| liaison.of(*c).next().is_none()).collect();
+/// E0503 for every component but the root that touches nothing; one that stands inside another has been told of.
+fn untouched(design: &Design, solids: &[Arc<Solid>], seen: &Seen) -> Vec<Diagnostic> {
+    let (liaison, mut inside) = (seen.liaison, vec![false; seen.liaison.components]);
+    seen.entering.iter().for_each(|e| (inside[e.a], inside[e.b]) = (true, true));
+    seen.clashes.iter().for_each(|c| (inside[c.a.component], inside[c.b.component]) = (true, true));
+    let alone = |c: &usize| liaison.of(*c).next().is_none() && !inside[*c];
+    let lonely: Vec<usize> = (1..liaison.components).filter(alone).collect();
     if lonely.is_empty() {
         return Vec::new();
     }

@@ -154,7 +154,7 @@ impl Case<'_> {
         }
         let limit = nominal + rounded_down(room.abs()).parse::<f64>().unwrap_or(0.0) * room.signum();
         let limit = (limit * 1e6).round() / 1e6;
-        let word = if room > 0.0 { "at most" } else { "at least" };
+        let word = if share.at > dim.range.nominal { "at most" } else { "at least" };
         Some(format!("`{}` {word} {limit}{unit}", dim.name))
     }
 }
