@@ -103,17 +103,7 @@ fn tori() -> Parts {
         ("torus_villarceau", vec![ring(), half([(3.0_f64 / 10.0).asin() + 0.05, 0.0, 0.0])]),
         (
             "torus_off_centre",
-            vec![
-                ring(),
-                feature(
-                    "cut",
-                    Op::Cut,
-                    vec![(block(60.0, 60.0, 60.0), posed([0.0, 8.5, -30.0], [0.0, 0.0, 0.0])); 1]
-                        .into_iter()
-                        .map(|(s, _)| (s, posed([0.0, 38.5, -30.0], [0.0; 3])))
-                        .collect(),
-                ),
-            ],
+            vec![ring(), feature("cut", Op::Cut, vec![(block(60.0, 60.0, 60.0), at(0.0, 38.5, -30.0))])],
         ),
         ("torus_hole", vec![ring(), feature("hole", Op::Cut, vec![(cylinder(2.0, 8.0), at(10.0, 0.0, 0.0))])]),
         (
