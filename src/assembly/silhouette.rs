@@ -32,9 +32,12 @@ pub(crate) struct Shade {
     pub shift: [f64; 3],
 }
 
+/// A solid in a rotation, by the bits of its quaternion.
+type Turned = (*const Solid, [u64; 4]);
+
 /// One shade per body.
 pub(crate) fn shades(frame: &Frame, solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Vec<Shade> {
-    let mut known: BTreeMap<(*const Solid, [u64; 4]), (usize, Arc<Silhouette>)> = BTreeMap::new();
+    let mut known: BTreeMap<Turned, (usize, Arc<Silhouette>)> = BTreeMap::new();
     let shade = |(solid, pose): (&Arc<Solid>, &Isometry3<f64>)| {
         let turn: [f64; 4] = pose.rotation.coords.into();
         let key = (Arc::as_ptr(solid), turn.map(f64::to_bits));

@@ -173,6 +173,6 @@ fn along(point: &Point3<f64>, direction: &Vector3<f64>, within: &Bounds) -> Vec<
     if stretch.iter().any(|t| !t.is_finite()) || stretch[0] > stretch[1] {
         return Vec::new();
     }
-    let share = |k: usize| 0.5 + (k as f64 / 2.0).ceil() / TRIED as f64 * if k % 2 == 0 { 1.0 } else { -1.0 };
+    let share = |k: usize| 0.5 + (k as f64 / 2.0).ceil() / TRIED as f64 * if k.is_multiple_of(2) { 1.0 } else { -1.0 };
     (0..TRIED).map(|k| point + direction * (stretch[0] + (stretch[1] - stretch[0]) * share(k))).collect()
 }
