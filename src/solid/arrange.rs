@@ -339,10 +339,13 @@ fn uses(tree: &Tree, curve: &SharedCurve, arc: &Arc) -> Vec<Use> {
         return Vec::new();
     }
     let mut uses = Vec::new();
+    // Faces that pass the arc as if it were not there: two of them touch along it.
+    let mut passing = Vec::new();
     for (place, &surface) in surfaces.iter().enumerate() {
         let left = tree.surfaces[surface].normal_at(&middle).cross(&tangent);
         let sheets = [left, -left].map(|step| through.sheet(&leaves, place, &step));
         if sheets[0].map(|s| s.0) == sheets[1].map(|s| s.0) {
+            passing.extend(sheets[0].map(|(outward, leaf)| (surface, outward, leaf)));
             continue;
         }
         for (sheet, on_left) in sheets.iter().zip([true, false]) {
@@ -350,6 +353,10 @@ fn uses(tree: &Tree, curve: &SharedCurve, arc: &Arc) -> Vec<Use> {
                 uses.push(Use { surface, outward, forward: on_left == outward, leaf });
             }
         }
+    }
+    if passing.len() > 1 || !(passing.is_empty() || uses.is_empty()) {
+        let both = |(surface, outward, leaf)| [true, false].map(|forward| Use { surface, outward, forward, leaf });
+        uses.extend(passing.into_iter().flat_map(both));
     }
     uses
 }

@@ -105,7 +105,7 @@ fn check_manifold(tree: &Tree, arrangement: &Arrangement) -> Result<(), Faults> 
         if arc.uses.len() == 2 && forward == 1 {
             continue;
         }
-        if arc.uses.len() == 4 {
+        if arc.uses.len() >= 4 {
             return Err(vec![non_manifold(tree, arrangement, arc)]);
         }
         return Err(vec![internal(tree, &format!("an edge has {} faces", arc.uses.len()))]);

@@ -183,7 +183,32 @@ impl<'a> Tree<'a> {
         leaves.iter_mut().filter(|l| l.solid.is_through()).for_each(|l| l.solid.reach_through(&material));
         let mut tree = Tree { part, surfaces: Vec::new(), leaves: Vec::new(), steps };
         leaves.into_iter().for_each(|leaf| tree.add_leaf(leaf));
+        tree.check_apart()?;
         Ok(tree)
+    }
+
+    /// Refuses features with faces that almost coincide: whether they do is then a matter of rounding.
+    fn check_apart(&self) -> Result<(), Vec<Diagnostic>> {
+        for (i, first) in self.surfaces.iter().enumerate() {
+            let close = |j: &usize| coincide(first, &self.surfaces[*j], tolerance::APART).is_some();
+            for j in (i + 1..self.surfaces.len()).filter(close) {
+                let on = |s: usize| self.leaves.iter().filter(move |l| l.sides.iter().any(|side| side.surface == s));
+                let meets = |a: &&Leaf, b: &Leaf| a.bounds.widened(tolerance::CULL).common(&b.bounds).is_some();
+                let pair = on(i).find_map(|a| on(j).find(|b| meets(b, a)).map(|b| (a, b)));
+                if let Some((a, b)) = pair {
+                    return Err(vec![self.almost_flush(a, b)]);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn almost_flush(&self, a: &Leaf, b: &Leaf) -> Diagnostic {
+        let message = format!("faces of `{}` and `{}` of `{}` almost coincide", a.name, b.name, self.part.name);
+        Diagnostic::error("E0406", b.span, message)
+            .label(format!("less than {} mm from the other, and not flush with it", tolerance::APART))
+            .also(a.span, "this one")
+            .note("make them flush, or leave a wall or a gap that can be made")
     }
 
     /// Whether a point is in the part, given the leaves it is in, ascending.
@@ -224,7 +249,7 @@ impl<'a> Tree<'a> {
     /// Index of the surface, and whether its canonical normal points the same way.
     fn intern(&mut self, surface: Surface) -> (usize, bool) {
         for (i, known) in self.surfaces.iter().enumerate() {
-            if let Some(same) = coincide(known, &surface) {
+            if let Some(same) = coincide(known, &surface, tolerance::POINT) {
                 return (i, same);
             }
         }
@@ -330,10 +355,10 @@ pub(super) fn side_at(part: &Part, values: &Values, face: &str) -> Option<Surfac
     leaf.sides.iter().find(|s| s.name == side).map(|s| tree.surfaces[s.surface].clone())
 }
 
-/// Whether two surfaces are the same set of points, and if so whether their canonical normals agree.
-pub(super) fn coincide(a: &Surface, b: &Surface) -> Option<bool> {
+/// Whether two surfaces are the same set of points, within a distance, and if so whether their canonical normals agree.
+fn coincide(a: &Surface, b: &Surface, within: f64) -> Option<bool> {
     use Surface::{Cone, Cylinder, Plane, Sphere, Torus};
-    let near = |x: f64, y: f64| (x - y).abs() < tolerance::POINT;
+    let near = |x: f64, y: f64| (x - y).abs() < within;
     let along = |d: &Unit<Vector3<f64>>, e: &Unit<Vector3<f64>>| d.cross(e).norm() < tolerance::DIRECTION;
     match (a, b) {
         (Plane { normal: n, offset: d }, Plane { normal: m, offset: e }) => {
@@ -341,19 +366,19 @@ pub(super) fn coincide(a: &Surface, b: &Surface) -> Option<bool> {
             (near(*d, e * sign) && along(n, m)).then_some(sign > 0.0)
         }
         (Cylinder { point: p, axis: n, radius: r }, Cylinder { point: q, axis: m, radius: s }) => {
-            (near(*r, *s) && along(n, m) && radial(p, n, q).norm() < tolerance::POINT).then_some(true)
+            (near(*r, *s) && along(n, m) && radial(p, n, q).norm() < within).then_some(true)
         }
         (Cone { apex: p, axis: n, half_angle: r }, Cone { apex: q, axis: m, half_angle: s }) => {
             let turned = (n.into_inner() - m.into_inner()).norm();
             let same = (r - s).abs() < tolerance::DIRECTION && turned < tolerance::DIRECTION;
-            (same && (p - q).norm() < tolerance::POINT).then_some(true)
+            (same && (p - q).norm() < within).then_some(true)
         }
         (Sphere { centre: p, radius: r, .. }, Sphere { centre: q, radius: s, .. }) => {
-            (near(*r, *s) && (p - q).norm() < tolerance::POINT).then_some(true)
+            (near(*r, *s) && (p - q).norm() < within).then_some(true)
         }
         (Torus { centre: p, axis: n, major: a, minor: r }, Torus { centre: q, axis: m, major: b, minor: s }) => {
             let same = near(*a, *b) && near(*r, *s) && along(n, m);
-            (same && (p - q).norm() < tolerance::POINT).then_some(true)
+            (same && (p - q).norm() < within).then_some(true)
         }
         _ => None,
     }

@@ -10,6 +10,8 @@ use super::locus::Locus;
 use super::surface::{across, is_ring, pole_angle};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{PI, TAU};
+use std::iter::Sum;
+use std::ops::Mul;
 
 /// Area (mm²) of a face and the volume (mm³) of the cone from a point to it, signed by its outward side.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,18 +62,15 @@ impl Run<'_> {
     }
 
     /// Integral over the parameter of a function of the point and its derivative, forward along the curve.
-    fn sum<T: std::iter::Sum<T>>(&self, f: impl Fn(Point3<f64>, Vector3<f64>) -> T) -> T
+    fn sum<T>(&self, f: impl Fn(Point3<f64>, Vector3<f64>) -> T) -> T
     where
-        T: std::ops::Mul<f64, Output = T>,
+        T: Sum<T> + Mul<f64, Output = T>,
     {
-        let places = self.places();
-        places
-            .into_iter()
-            .map(|(t, weight)| {
-                let (p, motion) = self.locus.moving(t);
-                f(p, motion) * weight
-            })
-            .sum()
+        let slice = |(t, weight): (f64, f64)| {
+            let (p, motion) = self.locus.moving(t);
+            f(p, motion) * weight
+        };
+        self.places().into_iter().map(slice).sum()
     }
 
     /// Parameters and weights of the quadrature, ascending.

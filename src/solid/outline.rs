@@ -176,7 +176,7 @@ fn with_corners(pieces: &[Piece], corners: &[&Corner], values: &Values) -> Resul
 impl Piece {
     fn drawn(from: Point, to: Point, path: &OutlinePath, name: &str, values: &Values) -> Result<Piece, String> {
         let chord = length(minus(to, from));
-        if !(chord > SHORTEST) {
+        if chord.is_nan() || chord <= SHORTEST {
             return Err(format!("has an outline whose side `{name}` has no length"));
         }
         let arc = match path {
@@ -184,7 +184,7 @@ impl Piece {
             OutlinePath::Arc { radius, left, long } => {
                 let radius = radius.eval(values);
                 let rise = radius * radius - chord * chord / 4.0;
-                if !(radius > SHORTEST) || rise < -tolerance::POINT * radius {
+                if radius.is_nan() || radius <= SHORTEST || rise < -tolerance::POINT * radius {
                     return Err(format!(
                         "has an arc `{name}` whose ends are {chord:.4} mm apart, more than its diameter"
                     ));
@@ -505,8 +505,11 @@ mod tests {
         p.map(Expr::Const)
     }
 
-    fn outline(start: Point, sides: &[(Point, Option<(f64, bool, bool)>, Corner)]) -> Outline {
-        let side = |(i, (to, arc, corner)): (usize, &(Point, Option<(f64, bool, bool)>, Corner))| OutlineSide {
+    /// End, arc (radius, left, long), corner at the end.
+    type Drawn = (Point, Option<(f64, bool, bool)>, Corner);
+
+    fn outline(start: Point, sides: &[Drawn]) -> Outline {
+        let side = |(i, (to, arc, corner)): (usize, &Drawn)| OutlineSide {
             name: (i + 1).to_string(),
             to: number(*to),
             path: match arc {

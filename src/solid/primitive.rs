@@ -70,7 +70,7 @@ impl Sized {
             Shape::Cone { d1, d2, h } => {
                 let [low, high] = [d1, d2].map(|d| d.eval(values) / 2.0);
                 positive(low.max(high))?;
-                if !(low.min(high) >= 0.0) {
+                if low.is_nan() || high.is_nan() || low.min(high) < 0.0 {
                     return Err("has a negative diameter".into());
                 }
                 (Kind::Round { low, high }, 0.0, reach(h)?)

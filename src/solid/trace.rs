@@ -36,6 +36,8 @@ const MOST_CELLS: usize = 400_000;
 const FINEST: f64 = 5e-4;
 /// Half the diagonal of the largest boxes that curves are looked for in, as a share of the whole.
 const COARSEST: f64 = 1.0 / 12.0;
+/// Boxes of half this diagonal look for a touching point; what lies nearer to one holds no curve that does not lead out (mm).
+const NODE_REACH: f64 = 0.03;
 /// How far a curve is followed beyond the boxes: share of the box, and mm.
 const BEYOND: (f64, f64) = (0.03, 0.02);
 /// A known curve along which the surfaces touch is left out with this much round it (mm).
@@ -102,14 +104,18 @@ impl Search<'_> {
             }
             if reach <= whole * COARSEST && self.crosses_plainly(&middle, reach) {
                 let seed = onto(self.surfaces, middle);
-                if (seed - middle).norm() < 2.0 * reach && self.on_both(&seed) {
+                // Where no point of both is near, Newton's steps may end by a touching point farther off.
+                let plain = self.sine(&seed) > LEAST_SINE * self.sine(&middle);
+                if (seed - middle).norm() < 2.0 * reach && self.on_both(&seed) && plain {
                     self.seeds.push(seed);
                 }
                 continue;
             }
-            if reach < FINEST {
-                self.node_near(&middle);
-                continue;
+            if reach < NODE_REACH {
+                self.node_near(&middle, reach);
+                if reach < FINEST || self.nodes.iter().any(|n| (n - middle).norm() < NODE_REACH) {
+                    continue;
+                }
             }
             let longest = extent.imax();
             let (mut low, mut high) = (cell, cell);
@@ -130,21 +136,30 @@ impl Search<'_> {
 
     /// Whether the normals differ so much all over the box that the surfaces cannot touch in it.
     fn crosses_plainly(&self, middle: &Point3<f64>, reach: f64) -> bool {
-        let [n, m] = self.surfaces.map(|s| s.normal_at(middle));
         let bend: f64 = self.surfaces.iter().map(|s| sharpest_bend(s, middle, reach)).sum();
-        n.cross(&m).norm() > bend * reach * 1.5
+        self.sine(middle) > bend * reach * 1.5
+    }
+
+    /// Of the angle of the surfaces' normals.
+    fn sine(&self, p: &Point3<f64>) -> f64 {
+        let [n, m] = self.surfaces.map(|s| s.normal_at(p));
+        n.cross(&m).norm()
     }
 
     /// Remembers the place near `p` where the surfaces touch or the apex of one lies on the other, if there is one.
-    fn node_near(&mut self, p: &Point3<f64>) {
+    fn node_near(&mut self, p: &Point3<f64>, reach: f64) {
+        // Looked for once at the first scale and once at the last: in between the answer would be the same.
+        if reach < NODE_REACH / 2.0 && reach >= FINEST {
+            return;
+        }
+        let stray = 4.0 * reach.max(FINEST);
         let [a, b] = self.surfaces;
         let apex = |s: &Surface, t: &Surface| match s {
             Surface::Cone { apex, .. } if t.distance(apex).abs() < tolerance::TOUCH => Some(*apex),
             _ => None,
         };
-        let apexes = apex(a, b).into_iter().chain(apex(b, a)).filter(|q| (q - p).norm() < 4.0 * FINEST);
-        let found = apexes.chain(touch_near(self.surfaces, p));
-        for node in found {
+        let found = apex(a, b).into_iter().chain(apex(b, a)).chain(touch_near(self.surfaces, p));
+        for node in found.filter(|q| (q - p).norm() < stray) {
             if self.nodes.iter().all(|n| (n - node).norm() > SAME_NODE) {
                 self.nodes.push(node);
             }
@@ -152,6 +167,8 @@ impl Search<'_> {
     }
 }
 
+/// Share of the sine in the middle of a box that the sine at a point of both surfaces in it has at least.
+const LEAST_SINE: f64 = 0.1;
 /// A point this near both surfaces (mm) lies on them: Newton's steps end far below.
 const ON: f64 = 1e-9;
 /// Nodes nearer than this (mm) are one: a touch is found to about the root of the tolerance of distances.
@@ -195,7 +212,7 @@ fn touch_near([a, b]: [&Surface; 2], p: &Point3<f64>) -> Option<Point3<f64>> {
     }
     let touches = a.distance(&q).abs() < tolerance::TOUCH && b.distance(&q).abs() < tolerance::TOUCH;
     let level = a.normal_at(&q).cross(&b.normal_at(&q)).norm() < LEVEL;
-    (touches && level && (q - p).norm() < STRAY_NODE).then_some(q)
+    (touches && level).then_some(q)
 }
 
 /// Differences are taken over this step (mm).
@@ -204,8 +221,6 @@ const STEP: f64 = 1e-5;
 const LONGEST_STEP: f64 = 0.01;
 /// Sine of the angle of the surfaces at a node.
 const LEVEL: f64 = 1e-6;
-/// A node lies within this (mm) of the box that it was looked for from.
-const STRAY_NODE: f64 = 0.02;
 
 /// Follows curves.
 struct Walk<'a> {
