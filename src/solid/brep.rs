@@ -5,6 +5,7 @@
 //! body. Nothing is repaired.
 
 use super::arrange::{Arc, Arrangement, Use};
+use super::corner::sharpest;
 use super::csg::{Leaf, Side, Tree};
 use super::locus::Locus;
 use super::measure::{self, Flux, Run};
@@ -13,7 +14,6 @@ use super::{Edge, Face, Quality, Solid, Surface, TriMesh};
 use crate::diag::Diagnostic;
 use nalgebra::{Point3, Unit, Vector3};
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 
 type Faults = Vec<Diagnostic>;
 
@@ -235,69 +235,6 @@ fn trace(tree: &Tree, arrangement: &Arrangement, sheet: Sheet, halves: &[(usize,
         }
     }
     Ok(loops)
-}
-
-/// Of the half-edges that leave a corner, the first clockwise from the one that came. Where curves touch at the corner their
-/// bends decide.
-fn sharpest(
-    tree: &Tree,
-    arrangement: &Arrangement,
-    (surface, outward): Sheet,
-    halves: &[(usize, bool)],
-    came: (usize, bool),
-    choices: &[usize],
-) -> Option<usize> {
-    if let [only] = choices {
-        return Some(*only);
-    }
-    let back = Leaving::new(arrangement, (came.0, !came.1));
-    let normal = tree.surfaces[surface].normal_at(&back.corner) * if outward { 1.0 } else { -1.0 };
-    let bend = |l: &Leaving| l.bend.dot(&normal.cross(&l.direction));
-    let clockwise = |h: usize| {
-        let leaving = Leaving::new(arrangement, halves[h]);
-        let (d, from) = (leaving.direction, back.direction);
-        let angle = -(normal.dot(&from.cross(&d))).atan2(from.dot(&d));
-        // Straight back comes last: a face is not left by the edge it came along. A curve that touches that edge and bends
-        // away clockwise comes first.
-        let angle = match angle {
-            a if a.abs() < TIE && bend(&leaving) < bend(&back) - SAME_BEND => 0.0,
-            a if a.abs() < TIE => TAU,
-            a if a < 0.0 => a + TAU,
-            a => a,
-        };
-        ((angle / TIE).round() as i64, -bend(&leaving))
-    };
-    let before =
-        |a: &(i64, f64), b: &(i64, f64)| if (a.0 - b.0).abs() <= 1 { a.1.total_cmp(&b.1) } else { a.0.cmp(&b.0) };
-    choices.iter().copied().min_by(|a, b| before(&clockwise(*a), &clockwise(*b)))
-}
-
-/// Directions at a corner that differ by less (rad) touch: two curves that overlap by the tolerance of touching.
-const TIE: f64 = 2e-5;
-/// Bends (1/mm) that differ by less are one edge's.
-const SAME_BEND: f64 = 1e-6;
-
-/// How a half-edge leaves its corner: direction, and how the direction turns per mm.
-struct Leaving {
-    corner: Point3<f64>,
-    direction: Vector3<f64>,
-    bend: Vector3<f64>,
-}
-
-/// Share of an edge over which its bend at the end is taken.
-const BEND_SHARE: f64 = 1e-3;
-
-impl Leaving {
-    fn new(arrangement: &Arrangement, (arc, forward): (usize, bool)) -> Self {
-        let arc = &arrangement.arcs[arc];
-        let locus = &arrangement.curves[arc.curve];
-        let way = if forward { 1.0 } else { -1.0 };
-        let t = arc.span[usize::from(!forward)];
-        let on = t + way * (arc.span[1] - arc.span[0]) * BEND_SHARE;
-        let (corner, direction) = (locus.at(t), locus.tangent(t) * way);
-        let length = (locus.at(on) - corner).norm().max(f64::MIN_POSITIVE);
-        Leaving { corner, direction, bend: (locus.tangent(on) * way - direction) / length }
-    }
 }
 
 /// Sorts the loops of a sheet into faces: from the lowest point of each hole, the first loop met straight below bounds

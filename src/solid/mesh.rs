@@ -4,7 +4,8 @@
 //! the same samples of their common edge, so the mesh is closed without any joining; a seam uses no point of its own
 //! but on a sphere, where both its sides share them.
 
-use super::ring::{Chart, Grid, Node, Outline, Ring, lay_out, offsets};
+use super::border::{Grid, Outline};
+use super::ring::{Chart, Node, Ring, lay_out, offsets};
 use super::surface::tube_angle;
 use super::{Face, Quality, Solid, Surface, TriMesh, tolerance};
 use nalgebra::Point3;

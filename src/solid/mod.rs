@@ -9,7 +9,9 @@
 //! and volume, `mesh` triangulates.
 
 mod arrange;
+mod border;
 mod brep;
+mod corner;
 mod csg;
 mod intersect;
 mod locus;

@@ -2,7 +2,8 @@
 //!
 //! In: a [`Solid`]. Out: boxes, numbers, polygons. Nothing here changes a solid.
 
-use super::ring::{Grid, Outline, offsets};
+use super::border::{Grid, Outline};
+use super::ring::offsets;
 use super::{Face, Quality, Solid, Surface, mesh};
 use nalgebra::Point3;
 

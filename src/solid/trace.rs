@@ -149,7 +149,7 @@ impl Search<'_> {
     /// Remembers the place near `p` where the surfaces touch or the apex of one lies on the other, if there is one.
     fn node_near(&mut self, p: &Point3<f64>, reach: f64) {
         // Looked for once at the first scale and once at the last: in between the answer would be the same.
-        if reach < NODE_REACH / 2.0 && reach >= FINEST {
+        if (FINEST..NODE_REACH / 2.0).contains(&reach) {
             return;
         }
         let stray = 4.0 * reach.max(FINEST);

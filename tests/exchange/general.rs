@@ -185,9 +185,12 @@ fn apple() -> Outline {
     apple
 }
 
-/// An outline of straight sides and arcs (radius, counter-clockwise).
-fn outline(start: [f64; 2], sides: &[([f64; 2], Option<(f64, bool)>)]) -> Outline {
-    let side = |(i, (to, arc)): (usize, &([f64; 2], Option<(f64, bool)>))| OutlineSide {
+/// End of a side, and its arc (radius, counter-clockwise) unless it is straight.
+type Drawn = ([f64; 2], Option<(f64, bool)>);
+
+/// An outline of straight sides and arcs.
+fn outline(start: [f64; 2], sides: &[Drawn]) -> Outline {
+    let side = |(i, (to, arc)): (usize, &Drawn)| OutlineSide {
         name: format!("{}", i + 1),
         to: to.map(number),
         path: match arc {
