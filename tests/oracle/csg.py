@@ -5,7 +5,7 @@ degrees as in the text. Nothing here draws random numbers or judges a result.
 """
 
 from dataclasses import dataclass, field
-from math import acos, atan2, ceil, cos, degrees, hypot, pi, radians, sin, sqrt
+from math import acos, atan2, ceil, cos, hypot, pi, radians, sin, sqrt, tan
 
 import numpy as np
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
@@ -188,14 +188,69 @@ class Arc:
 
 @dataclass
 class Outline:
-    """A closed outline: its corners, and for each side (to the next corner, the last to the first) an arc or `None`."""
+    """A closed outline: its corners, for each side (to the next corner, the last to the first) an arc or `None`, and
+    for some corners (by index) how they are broken: `("round", radius)` or `("chamfer", distance)`."""
 
     points: list
     arcs: list
+    broken: dict = field(default_factory=dict)
+
+    def text(self, name):
+        n = len(self.points)
+        lines = [f"outline {name} {{", f"from {point(self.points[0])}{self.corner(0)}"]
+        for i, arc in enumerate(self.arcs):
+            end = f"to {point(self.points[(i + 1) % n])}"
+            last = "" if i == n - 1 else self.corner(i + 1)
+            if arc:
+                hand = ("left" if arc.left else "right") + (" long" if arc.long else "")
+                lines.append(f"arc {end} radius {num(arc.radius)} {hand}{last}")
+            elif i < n - 1:
+                lines.append(f"line {end}{last}")
+        return "\n".join([*lines, "}"])
+
+    def corner(self, i):
+        return f" {self.broken[i][0]} {num(self.broken[i][1])}" if i in self.broken else ""
 
     def sides(self):
+        """Start, end and arc of every stretch, broken corners included."""
         n = len(self.points)
-        return [(self.points[i], self.points[(i + 1) % n], self.arcs[i]) for i in range(n)]
+        out = []
+        for i in range(n):
+            start, end = self.leave(i), self.reach((i + 1) % n)
+            out.append((start, end, self.arcs[i]))
+            if (i + 1) % n in self.broken:
+                out.append((end, self.leave((i + 1) % n), self.fillet((i + 1) % n)))
+        return out
+
+    def leave(self, i):
+        """Where the boundary goes on behind corner i."""
+        return self.along(i, (i + 1) % len(self.points))
+
+    def reach(self, i):
+        """Where the boundary ends before corner i."""
+        return self.along(i, i - 1)
+
+    def along(self, i, towards):
+        if i not in self.broken:
+            return self.points[i]
+        (x, y), (a, b) = self.points[i], self.points[towards]
+        d, back = hypot(a - x, b - y), self.setback(i)
+        return (x + (a - x) * back / d, y + (b - y) * back / d)
+
+    def turning(self, i):
+        """Angle between the sides at corner i, and whether the boundary turns left there."""
+        (p, q, r) = (self.points[i - 1], self.points[i], self.points[(i + 1) % len(self.points)])
+        (u, v) = ((p[0] - q[0], p[1] - q[1]), (r[0] - q[0], r[1] - q[1]))
+        angle = acos((u[0] * v[0] + u[1] * v[1]) / (hypot(*u) * hypot(*v)))
+        return angle, u[0] * v[1] - u[1] * v[0] < 0
+
+    def setback(self, i):
+        kind, size = self.broken[i]
+        return size if kind == "chamfer" else size / tan(self.turning(i)[0] / 2)
+
+    def fillet(self, i):
+        kind, size = self.broken[i]
+        return None if kind == "chamfer" else Arc(size, self.turning(i)[1])
 
     def holds(self, u, v):
         """Even-odd rule; an arc adds the segment between it and its chord."""
@@ -252,9 +307,10 @@ def in_segment(u, v, p, q, arc):
 class Prism:
     outline: Outline
     h: object
+    name: str = ""
 
     def text(self):
-        return f"prism({outline_text(self.outline)}, h = {height(self.h)})"
+        return f"prism(outline = {self.name}, h = {height(self.h)})"
 
     def occ(self):
         a, b = stretch(self.h)
@@ -269,9 +325,10 @@ class Prism:
 @dataclass
 class Revolve:
     outline: Outline
+    name: str = ""
 
     def text(self):
-        return f"revolve({outline_text(self.outline)})"
+        return f"revolve(outline = {self.name})"
 
     def occ(self):
         wire = self.outline.wire(lambda r, z: gp_Pnt(r, 0, z))
@@ -281,8 +338,34 @@ class Revolve:
         return self.outline.holds(np.sqrt(x * x + y * y), z)
 
 
-def outline_text(outline):
-    raise NotImplementedError
+@dataclass
+class Group:
+    """Features folded among themselves."""
+
+    features: list
+
+    def occ(self):
+        return fold(self.features, np.eye(4), False)
+
+    def holds(self, x, y, z):
+        return hold(self.features, np.stack([x, y, z]))
+
+
+def hold(features, p):
+    """Which of the points (columns of p) the features leave material at."""
+    inside = np.zeros(p.shape[1], bool)
+    for f in features:
+        within = f.holds(p)
+        inside = {"add": inside | within, "cut": inside & ~within, "keep": inside & within}[f.op]
+    return inside
+
+
+def fold(features, pose, one_by_one):
+    result = None
+    for f in features:
+        copies = [moved(f.shape.occ(), pose @ m) for m in f.frames()]
+        result = combine(f.op, result, copies[::-1] if one_by_one else copies, one_by_one)
+    return result
 
 
 @dataclass
@@ -348,14 +431,27 @@ class Feature:
 
     def text(self):
         times = f"{self.count}x " if self.pattern else ""
-        out = f"{self.op} {self.name} = {times}{self.shape.text()}"
+        group = isinstance(self.shape, Group)
+        out = f"{self.op} {self.name} = {times}{'group' if group else self.shape.text()}"
         out += f" at {point(self.at)}" if any(self.at) else ""
         out += f" turn {point(self.turn)}" if any(self.turn) else ""
-        return out + (f" on {self.pattern.text()}" if self.pattern else "")
+        out += f" on {self.pattern.text()}" if self.pattern else ""
+        return "\n".join([out + " {", *(f.text() for f in self.shape.features), "}"]) if group else out
+
+    def outlines(self):
+        """Text of the outlines it needs, whose names are told to their shapes."""
+        if isinstance(self.shape, Group):
+            return [text for f in self.shape.features for text in f.outlines()]
+        if isinstance(self.shape, (Prism, Revolve)):
+            self.shape.name = f"{self.name}_outline"
+            return [self.shape.outline.text(self.shape.name)]
+        return []
 
     def frames(self):
-        own = frame(self.at, self.turn)
-        return [f @ own for f in self.pattern.frames(self.count)] if self.pattern else [own]
+        """T(at) · T(offset) · Rz(angle) · R(turn): a pattern is centred on `at`."""
+        own = frame(turn=self.turn)
+        places = self.pattern.frames(self.count) if self.pattern else [np.eye(4)]
+        return [frame(self.at) @ place @ own for place in places]
 
     def holds(self, p):
         """Which of the points (columns of p) lie in one of the copies."""
@@ -371,21 +467,17 @@ class Part:
     features: list = field(default_factory=list)
     pose: tuple = None
 
+    def text(self):
+        """Outlines, then features, one a line."""
+        outlines = [text for f in self.features for text in f.outlines()]
+        return "\n".join([*outlines, *(f.text() for f in self.features)])
+
     def holds(self, p):
-        inside = np.zeros(p.shape[1], bool)
-        for f in self.features:
-            within = f.holds(p)
-            inside = {"add": inside | within, "cut": inside & ~within, "keep": inside & within}[f.op]
-        return inside
+        return hold(self.features, p)
 
     def occ(self, pose=None, one_by_one=False):
         """The solid before faces are merged. One by one: each copy is an operation of its own, last copy first."""
-        pose = np.eye(4) if pose is None else pose
-        result = None
-        for f in self.features:
-            copies = [moved(f.shape.occ(), pose @ m) for m in f.frames()]
-            result = combine(f.op, result, copies[::-1] if one_by_one else copies, one_by_one)
-        return result
+        return fold(self.features, np.eye(4) if pose is None else pose, one_by_one)
 
 
 def combine(op, result, copies, one_by_one):

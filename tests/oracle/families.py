@@ -14,6 +14,7 @@ from csg import (
     Cylinder,
     Feature,
     Grid,
+    Group,
     Line,
     Outline,
     Part,
@@ -492,4 +493,227 @@ def tori(rng):
     return several(d, (bored, bored, halved, leaning, radial, drilled_ring, hub, slots, groove, quarter), 0, 2)
 
 
-FAMILIES = {"a": classic, "b": coaxial, "c": oblique, "d": cross_drilled, "e": off_axis, "f": tori}
+# --- Prisms and revolves -----------------------------------------------------------------------------------------------
+
+
+def rectangle(d, x, y):
+    """Centred, with some of its corners broken."""
+    points = [(-x / 2, -y / 2), (x / 2, -y / 2), (x / 2, y / 2), (-x / 2, y / 2)]
+    if d.chance(0.5):
+        points = points[::-1]
+    size = d.one(1, 2, 3, 4)
+    kind = d.one("round", "round", "chamfer")
+    broken = {i: (kind, size) for i in range(4) if d.chance(0.8)}
+    return Outline(points, [None] * 4, broken)
+
+
+def angle_profile(d, x, y):
+    """L-shaped, with a fillet in the corner."""
+    t = d.one(4, 5)
+    points = [(-x / 2, -y / 2), (x / 2, -y / 2), (x / 2, -y / 2 + t), (-x / 2 + t, -y / 2 + t), (-x / 2 + t, y / 2), (-x / 2, y / 2)]
+    broken = {}
+    if d.chance(0.7):
+        broken[3] = ("round", d.one(1, 2, 3))
+    if d.chance(0.4):
+        broken[0] = (d.one("round", "chamfer"), d.one(2, 3))
+    return Outline(points, [None] * 6, broken)
+
+
+def obround_outline(d, x, y):
+    """Two lines and two half circles."""
+    r, a = y / 2, x / 2 - y / 2
+    return Outline([(-a, -r), (a, -r), (a, r), (-a, r)], [None, Arc(r), None, Arc(r)])
+
+
+def keyhole(d, x, y):
+    """A long arc on a neck: 3, 4, 5 makes the numbers whole."""
+    k = d.one(1, 2) if x > 12 else 1
+    w, h, r = 3 * k, 4 * k, 5 * k
+    return Outline([(-w, -h - 4), (w, -h - 4), (w, -h), (-w, -h)], [None, None, Arc(r, True, True), None])
+
+
+def notched(d, x, y):
+    """A rectangle with a round notch or nose on one side."""
+    w = d.one(2, 3)
+    arc = Arc(d.one(w, w + 1), d.chance(0.5))
+    points = [(-x / 2, -y / 2), (x / 2, -y / 2), (x / 2, -w), (x / 2, w), (x / 2, y / 2), (-x / 2, y / 2)]
+    return Outline(points, [None, None, arc, None, None, None])
+
+
+def hexagon(d, x, y):
+    r = y / sqrt(3)
+    points = [(r * cos(radians(60 * k)), r * sin(radians(60 * k))) for k in range(6)]
+    return Outline(points, [None] * 6)
+
+
+def half_round(d, x, y):
+    """A flat and an arc."""
+    r = d.one(x / 2, x / 2, 5 * x / 8)
+    return Outline([(-x / 2, 0), (x / 2, 0)], [None, Arc(r, True, d.chance(0.3) and r > x / 2)])
+
+
+def triangle(d, x, y):
+    points = [(-x / 2, -y / 2), (x / 2, -y / 2), (d.one(-x / 2, 0, 4), y / 2)]
+    broken = {i: ("round", d.one(1, 2)) for i in range(3) if d.chance(0.5)}
+    return Outline(points, [None] * 3, broken)
+
+
+OUTLINES = (rectangle, rectangle, angle_profile, obround_outline, keyhole, notched, hexagon, half_round, triangle)
+
+
+def prism_body(d):
+    h = d.one(4, 6, 8)
+    x, y = d.one(20, 24), d.one(12, 16)
+    d.levels.append(float(h))
+    d.size = y
+    d.put("add", Prism(d.one(*OUTLINES)(d, x, y), h))
+
+
+def prism_cut(d):
+    h, z = d.depth()
+    outline = d.one(*OUTLINES)(d, d.one(8, 10), d.one(4, 6))
+    d.put("cut", Prism(outline, h), (d.one(0, 0, 4, -5), d.one(0, 0, 4), z), (0, 0, d.one(0, 0, 90, d.angle())))
+
+
+def prism_boss(d):
+    h = d.one(2, 3, 4)
+    outline = d.one(*OUTLINES)(d, d.one(8, 10, 20), d.one(6, 8, 12))
+    d.put("add", Prism(outline, h), (d.one(0, 0, 4), 0, d.rise(h)))
+
+
+def prism_across(d):
+    """Through the body from the side."""
+    outline = d.one(*OUTLINES)(d, d.one(6, 8), d.one(2, 4))
+    d.put("cut", Prism(outline, THROUGH), (0, 0, d.one(d.top(), d.top() / 2, 3)), d.one((90, 0, 0), (90, 0, 90), (90, 0, d.angle())))
+
+
+def prism_kept(d):
+    h = d.top()
+    d.put("keep", Prism(d.one(rectangle, obround_outline, hexagon)(d, d.one(18, 20), d.one(12, 14)), h))
+
+
+def shaft_outline(d):
+    a, b, h, k = d.one(8, 10), d.one(4, 5), d.one(5, 6), d.one(12, 14)
+    broken = {}
+    for i, kinds in ((1, ("chamfer", "round")), (3, ("round",)), (4, ("chamfer", "round"))):
+        if d.chance(0.7):
+            broken[i] = (d.one(*kinds), 1)
+    return Outline([(0, 0), (a, 0), (a, h), (b, h), (b, k), (0, k)], [None] * 6, broken), a, k
+
+
+def ring_outline(d):
+    a, b, h = d.one(4, 5, 6), d.one(9, 10), d.one(4, 6)
+    broken = {i: (d.one("round", "round", "chamfer"), d.one(1, 1.5)) for i in range(4) if d.chance(0.6)}
+    return Outline([(a, 0), (b, 0), (b, h), (a, h)], [None] * 4, broken), b, h
+
+
+def ball_end(d):
+    r, h = d.one(6, 8), d.one(6, 8)
+    return Outline([(0, 0), (r, 0), (r, h), (0, h + r)], [None, None, Arc(r), None]), r, h
+
+
+def grooved(d):
+    a, h, w = d.one(8, 10), d.one(10, 12), d.one(1, 2)
+    z = d.one(4, 5)
+    arc = Arc(d.one(w, w, w + 1), d.chance(0.3))
+    return Outline([(0, 0), (a, 0), (a, z - w), (a, z + w), (a, h), (0, h)], [None, None, arc, None, None, None]), a, h
+
+
+def pulley(d):
+    a, b, h = 10, d.one(6, 7), d.one(8, 10)
+    broken = {i: ("round", 1) for i in (3, 4) if d.chance(0.6)}
+    return Outline([(3, 0), (a, 0), (a, 2), (b, 4), (b, h - 4), (a, h - 2), (a, h), (3, h)], [None] * 8, broken), a, h
+
+
+def waisted(d):
+    """A concave or convex flank: 5, 12, 13 makes the numbers whole."""
+    arc = Arc(13, d.chance(0.5))
+    return Outline([(0, 0), (8, 0), (8, 10), (0, 10)], [None, arc, None, None]), 8, 10
+
+
+def revolve_body(d):
+    outline, a, h = d.one(shaft_outline, shaft_outline, ring_outline, ball_end, grooved, pulley, waisted)(d)
+    d.size = 2 * a
+    d.levels.append(float(h))
+    d.put("add", Revolve(outline))
+
+
+def keyway(d):
+    d.put("cut", Box(8, d.one(2, 3), d.one(THROUGH, 4)), (d.size / 2, 0, 0), (0, 0, d.one(0, 0, 45)))
+
+
+def revolve_cut(d):
+    outline, _, _ = d.one(ring_outline, ball_end, shaft_outline)(d)
+    d.put("cut", Revolve(outline), (0, 0, d.one(d.top() - 3, d.top() - 4)))
+
+
+def drilled_across(d):
+    d.put("cut", Cylinder(d.one(2, 3, 4), THROUGH), (0, 0, d.one(3, 4, d.top() / 2)), (0, 90, d.one(0, 45)))
+
+
+def outlined(rng):
+    d = Draft(rng, "g")
+    if d.chance(0.5):
+        prism_body(d)
+        return several(d, (prism_cut, prism_cut, prism_boss, prism_across, prism_kept, holes, bore, slot, flat), 0, 3)
+    revolve_body(d)
+    return several(d, (keyway, revolve_cut, drilled_across, central_bore, holes, slot, flat, teeth), 0, 2)
+
+
+# --- Groups ------------------------------------------------------------------------------------------------------------
+
+
+def bushing(d, h, name):
+    """A tube, perhaps with a slot."""
+    size = d.one(6, 8)
+    features = [Feature("add", f"{name}a", Cylinder(size, h)), Feature("cut", f"{name}b", Cylinder(d.one(3, 4), d.one(h, THROUGH)))]
+    if d.chance(0.4):
+        features.append(Feature("cut", f"{name}c", Box(size, d.one(1, 2), d.one(THROUGH, 2))))
+    return Group(features)
+
+
+def socket(d, h, name):
+    """A pocket with something left standing in it, flush with its mouth."""
+    features = [Feature("add", f"{name}a", d.one(Box(8, 6, h), Cylinder(8, h))), Feature("cut", f"{name}b", d.one(Cylinder(3, h), Box(2, 2, h)))]
+    return Group(features)
+
+
+def clipped(d, h, name):
+    """A box within a cylinder."""
+    return Group([Feature("add", f"{name}a", Cylinder(8, h)), Feature("keep", f"{name}b", Box(d.one(6, 8), d.one(5, 6), h), turn=(0, 0, d.one(0, 30)))])
+
+
+def nested(d, h, name):
+    inner = d.one(bushing, clipped)(d, h, f"{name}i")
+    return Group([Feature("add", f"{name}a", Box(8, 8, d.one(2, h))), Feature(d.one("add", "cut"), f"{name}b", inner, (d.one(0, 2), 0, 0), (0, 0, d.one(0, 45)))])
+
+
+def grouped(rng):
+    d = Draft(rng, "h")
+    d.body()
+    for k in range(d.rng.randint(1, 3)):
+        op = d.one("add", "cut", "cut", "add", "keep")
+        if op == "keep":
+            outer = Group([Feature("add", f"k{k}a", Cylinder(d.size + 4, 40)), Feature("cut", f"k{k}b", Box(4, d.one(4, 40), 40), (d.size / 2, 0, 0))])
+            d.put("keep", outer, (0, 0, -10), (0, 0, d.one(0, 45, d.angle())))
+            continue
+        h = d.one(3, 4, 5)
+        z = d.top() if op == "add" else d.top() - d.one(2, h)
+        if op == "add" and d.chance(0.4):
+            z = 0
+        shape = (bushing if op == "add" else socket)(d, h, f"g{k}") if d.chance(0.5) else d.one(clipped, nested, socket)(d, h, f"g{k}")
+        turn = (0, 0, d.one(0, 0, 30, 45))
+        if d.chance(0.25):
+            turn = (d.one(90, 30, 180, d.angle()), 0, d.one(0, 90))
+        if d.chance(0.5):
+            d.put(op, shape, (0, 0, z), turn, d.one(2, 3, 4), Circle(d.one(6, 8, d.size / 2), d.one(0, 45)))
+        else:
+            d.put(op, shape, (d.one(0, 4, -5), d.one(0, 4), z), turn)
+        if op == "add":
+            d.levels.append(float(z + h))
+    if d.chance(0.5):
+        d.one(bore, holes, flat, slot)(d)
+    return d.part
+
+
+FAMILIES = {"a": classic, "b": coaxial, "c": oblique, "d": cross_drilled, "e": off_axis, "f": tori, "g": outlined, "h": grouped}
