@@ -53,7 +53,8 @@ struct Figures {
 
 #[test]
 fn every_part_has_the_figures_of_open_cascade() {
-    let other = std::env::var("GONOGO_PARTS").map(|path| std::fs::read_to_string(path).expect("GONOGO_PARTS names a file"));
+    let other =
+        std::env::var("GONOGO_PARTS").map(|path| std::fs::read_to_string(path).expect("GONOGO_PARTS names a file"));
     let cases = read(other.as_deref().unwrap_or(PARTS));
     let mut tally: BTreeMap<char, [usize; 3]> = BTreeMap::new();
     let mut failures: Vec<(usize, String)> = Vec::new();

@@ -194,7 +194,7 @@ fn pair(a: &Placed, op: Op, b: &Placed) -> Vec<Feature> {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 160, failure_persistence: None, rng_seed: RngSeed::Fixed(3), ..ProptestConfig::default()
+        cases: 96, failure_persistence: None, rng_seed: RngSeed::Fixed(3), ..ProptestConfig::default()
     })]
 
     #[test]
@@ -297,8 +297,9 @@ fn least_material_lies_inside_most_material() {
             let t = f64::from(step) / 4.0;
             design.dims.iter().map(|d| d.lmc + (d.mmc - d.lmc) * t).collect()
         };
-        let volumes: Vec<f64> =
-            steps.map(|s| evaluate(part, &draw(s), &Quality::default()).expect("builds at every limit").volume).collect();
+        let volumes: Vec<f64> = steps
+            .map(|s| evaluate(part, &draw(s), &Quality::default()).expect("builds at every limit").volume)
+            .collect();
         assert!(volumes.windows(2).all(|w| w[0] < w[1]), "{}: {volumes:?}", part.name);
     }
 }
@@ -309,8 +310,10 @@ fn nothing_of_least_material_is_outside_most_material() {
     for part in &design.parts {
         let frozen = |values: &[f64]| Shape::Group { features: freeze(&part.features, values) };
         let (least, most) = (frozen(&design.lmc()), frozen(&design.mmc()));
-        let features =
-            vec![feature("least", Op::Add, least, at(0.0, 0.0, 0.0)), feature("most", Op::Cut, most, at(0.0, 0.0, 0.0))];
+        let features = vec![
+            feature("least", Op::Add, least, at(0.0, 0.0, 0.0)),
+            feature("most", Op::Cut, most, at(0.0, 0.0, 0.0)),
+        ];
         match solid(features) {
             Ok(solid) => panic!("{}: {} mm³ stick out", part.name, solid.volume),
             Err(faults) => assert!([EMPTY, "E0408"].contains(&faults[0].code), "{faults:#?}"),
@@ -378,10 +381,14 @@ fn senseless_sizes_are_diagnostics() {
             torus(bad, 2.0),
             torus(8.0, bad),
             Shape::Prism { outline: outline(4.0, 3.0, 0.0), h: length(bad) },
+        ];
+        // Coordinates may be negative, sizes may not.
+        let drawn = [
             Shape::Prism { outline: outline(bad, 3.0, 0.0), h: length(2.0) },
             Shape::Revolve { outline: outline(4.0, bad, 1.0) },
         ];
-        for shape in shapes {
+        let drawn = drawn.into_iter().filter(|_| bad != -1.0);
+        for shape in shapes.into_iter().chain(drawn) {
             for op in [Op::Add, Op::Cut, Op::Keep] {
                 let what = format!("{op:?} {shape:?}");
                 let faults = solid(vec![body.clone(), feature("bad", op, shape.clone(), at(0.0, 0.0, 2.0))]);
@@ -453,32 +460,113 @@ fn touching_features_are_right_or_named() {
     let lying = |x, y, z| pose([x, y, z], [FRAC_PI_2, 0.0, 0.0]);
     let cone_volume = |r: f64, h: f64| PI * r * r * h / 3.0;
     let cases = [
-        ("holes touching in a line", vec![cut("one", cylinder(4.0, 10.0), at(-2.0, 0.0, 0.0)), cut("two", cylinder(4.0, 10.0), at(2.0, 0.0, 0.0))], all - 20.0 * hole),
-        ("blind holes touching in a line", vec![cut("one", cylinder(4.0, 5.0), at(-2.0, 0.0, 0.0)), cut("two", cylinder(4.0, 5.0), at(2.0, 0.0, 3.0))], all - 10.0 * hole),
-        ("hole touching the wall from inside", vec![cut("one", cylinder(4.0, 10.0), at(8.0, 0.0, 0.0))], all - 10.0 * hole),
+        (
+            "holes touching in a line",
+            vec![
+                cut("one", cylinder(4.0, 10.0), at(-2.0, 0.0, 0.0)),
+                cut("two", cylinder(4.0, 10.0), at(2.0, 0.0, 0.0)),
+            ],
+            all - 20.0 * hole,
+        ),
+        (
+            "blind holes touching in a line",
+            vec![cut("one", cylinder(4.0, 5.0), at(-2.0, 0.0, 0.0)), cut("two", cylinder(4.0, 5.0), at(2.0, 0.0, 3.0))],
+            all - 10.0 * hole,
+        ),
+        (
+            "hole touching the wall from inside",
+            vec![cut("one", cylinder(4.0, 10.0), at(8.0, 0.0, 0.0))],
+            all - 10.0 * hole,
+        ),
         ("hole touching the wall from outside", vec![cut("one", cylinder(4.0, 10.0), at(12.0, 0.0, 0.0))], all),
         ("hole through the corner", vec![cut("one", cylinder(4.0, 10.0), at(10.0, 10.0, 0.0))], all - 10.0 * PI),
-        ("crossed holes touching in a point", vec![cut("one", cylinder(4.0, 10.0), at(0.0, 0.0, 0.0)), cut("two", cylinder(2.0, 20.0), lying(3.0, 10.0, 5.0))], all - 10.0 * hole - 20.0 * PI),
-        ("hole touching a hole below in a line", vec![cut("one", cylinder(4.0, 20.0), lying(0.0, 10.0, 5.0)), cut("two", block(4.0, 20.0, 3.0), at(0.0, 0.0, 7.0))], all - 20.0 * hole - 240.0),
+        (
+            "crossed holes touching in a point",
+            vec![
+                cut("one", cylinder(4.0, 10.0), at(0.0, 0.0, 0.0)),
+                cut("two", cylinder(2.0, 20.0), lying(3.0, 10.0, 5.0)),
+            ],
+            all - 10.0 * hole - 20.0 * PI,
+        ),
+        (
+            "hole touching a hole below in a line",
+            vec![
+                cut("one", cylinder(4.0, 20.0), lying(0.0, 10.0, 5.0)),
+                cut("two", block(4.0, 20.0, 3.0), at(0.0, 0.0, 7.0)),
+            ],
+            all - 20.0 * hole - 240.0,
+        ),
         ("ball touching the top from inside", vec![cut("one", ball(4.0), at(0.0, 0.0, 8.0))], all - 32.0 * PI / 3.0),
-        ("balls touching in a point", vec![cut("one", ball(4.0), at(-2.0, 0.0, 5.0)), cut("two", ball(4.0), at(2.0, 0.0, 5.0))], all - 64.0 * PI / 3.0),
+        (
+            "balls touching in a point",
+            vec![cut("one", ball(4.0), at(-2.0, 0.0, 5.0)), cut("two", ball(4.0), at(2.0, 0.0, 5.0))],
+            all - 64.0 * PI / 3.0,
+        ),
         ("ball on a corner", vec![cut("one", ball(4.0), at(10.0, 10.0, 10.0))], all - 32.0 * PI / 3.0 / 8.0),
         ("ball on an edge", vec![cut("one", ball(4.0), at(10.0, 0.0, 10.0))], all - 32.0 * PI / 3.0 / 4.0),
         ("ball standing on the top", vec![add("one", ball(4.0), at(0.0, 0.0, 12.0))], all + 32.0 * PI / 3.0),
-        ("point of a cone in the top", vec![cut("one", cone(4.0, 0.0, 4.0), at(0.0, 0.0, 6.0))], all - cone_volume(2.0, 4.0)),
-        ("point of a cone on an edge", vec![cut("one", cone(0.0, 4.0, 4.0), at(10.0, 0.0, 6.0))], all - cone_volume(2.0, 4.0) / 2.0),
-        ("point of a cone standing on the top", vec![add("one", cone(0.0, 4.0, 4.0), at(0.0, 0.0, 10.0))], all + cone_volume(2.0, 4.0)),
-        ("points of two cones", vec![cut("one", cone(4.0, 0.0, 4.0), at(0.0, 0.0, 1.0)), cut("two", cone(0.0, 4.0, 4.0), at(0.0, 0.0, 5.0))], all - 2.0 * cone_volume(2.0, 4.0)),
-        ("cone through its own point by a plane", vec![cut("one", cone(0.0, 4.0, 4.0), at(0.0, 0.0, 6.0)), cut("two", block(20.0, 10.0, 10.0), at(0.0, 5.0, 0.0))], all / 2.0 - cone_volume(2.0, 4.0) / 2.0),
+        (
+            "point of a cone in the top",
+            vec![cut("one", cone(4.0, 0.0, 4.0), at(0.0, 0.0, 6.0))],
+            all - cone_volume(2.0, 4.0),
+        ),
+        (
+            "point of a cone on an edge",
+            vec![cut("one", cone(0.0, 4.0, 4.0), at(10.0, 0.0, 6.0))],
+            all - cone_volume(2.0, 4.0) / 2.0,
+        ),
+        (
+            "point of a cone standing on the top",
+            vec![add("one", cone(0.0, 4.0, 4.0), at(0.0, 0.0, 10.0))],
+            all + cone_volume(2.0, 4.0),
+        ),
+        (
+            "points of two cones",
+            vec![
+                cut("one", cone(4.0, 0.0, 4.0), at(0.0, 0.0, 1.0)),
+                cut("two", cone(0.0, 4.0, 4.0), at(0.0, 0.0, 5.0)),
+            ],
+            all - 2.0 * cone_volume(2.0, 4.0),
+        ),
+        (
+            "cone through its own point by a plane",
+            vec![
+                cut("one", cone(0.0, 4.0, 4.0), at(0.0, 0.0, 6.0)),
+                cut("two", block(20.0, 10.0, 10.0), at(0.0, 5.0, 0.0)),
+            ],
+            all / 2.0 - cone_volume(2.0, 4.0) / 2.0,
+        ),
         ("ring touching the top", vec![cut("one", torus(8.0, 2.0), at(0.0, 0.0, 9.0))], all - 8.0 * PI * PI),
         ("ring half sunk", vec![cut("one", torus(8.0, 2.0), at(0.0, 0.0, 10.0))], all - 4.0 * PI * PI),
         ("boss flush with the wall", vec![add("one", cylinder(4.0, 2.0), at(8.0, 0.0, 10.0))], all + 2.0 * hole),
-        ("boss on the corner edges", vec![add("one", cylinder(4.0, 12.0), at(10.0, 10.0, 0.0))], all + 12.0 * hole - 10.0 * PI),
-        ("rods crossing at a right angle", vec![add("one", cylinder(4.0, 40.0), lying(0.0, 20.0, 10.0))], all + 20.0 * hole + 10.0 * hole),
+        (
+            "boss on the corner edges",
+            vec![add("one", cylinder(4.0, 12.0), at(10.0, 10.0, 0.0))],
+            all + 12.0 * hole - 10.0 * PI,
+        ),
+        (
+            "rods crossing at a right angle",
+            vec![add("one", cylinder(4.0, 40.0), lying(0.0, 20.0, 10.0))],
+            all + 20.0 * hole + 10.0 * hole,
+        ),
         ("block touching at an edge", vec![add("one", block(4.0, 4.0, 4.0), at(12.0, 12.0, 0.0))], all + 64.0),
         ("block touching at a corner", vec![add("one", block(4.0, 4.0, 4.0), at(12.0, 12.0, 10.0))], all + 64.0),
-        ("pocket touching a pocket at an edge", vec![cut("one", block(4.0, 4.0, 4.0), at(2.0, 2.0, 0.0)), cut("two", block(4.0, 4.0, 4.0), at(-2.0, -2.0, 0.0))], all - 128.0),
-        ("pocket touching a pocket at a corner", vec![cut("one", block(4.0, 4.0, 4.0), at(2.0, 2.0, 1.0)), cut("two", block(4.0, 4.0, 4.0), at(-2.0, -2.0, 5.0))], all - 128.0),
+        (
+            "pocket touching a pocket at an edge",
+            vec![
+                cut("one", block(4.0, 4.0, 4.0), at(2.0, 2.0, 0.0)),
+                cut("two", block(4.0, 4.0, 4.0), at(-2.0, -2.0, 0.0)),
+            ],
+            all - 128.0,
+        ),
+        (
+            "pocket touching a pocket at a corner",
+            vec![
+                cut("one", block(4.0, 4.0, 4.0), at(2.0, 2.0, 1.0)),
+                cut("two", block(4.0, 4.0, 4.0), at(-2.0, -2.0, 5.0)),
+            ],
+            all - 128.0,
+        ),
     ];
     let judge = |(what, features, expected): (&str, Vec<Feature>, f64)| {
         let features: Vec<Feature> = std::iter::once(body()).chain(features).collect();

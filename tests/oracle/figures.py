@@ -9,7 +9,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
 from OCP.GProp import GProp_GProps
@@ -19,11 +19,14 @@ from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS
 from OCP.Bnd import Bnd_Box
 from OCP.BRepBndLib import BRepBndLib
+from OCP.gp import gp_Pnt, gp_Vec
 from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
 
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus")
 # Surfaces whose parameters differ by less are one, mm and rad.
 SAME = 1e-6
+# Edges that meet at more than this angle do not continue each other, rad: a traced curve may bend a little at a joint.
+KINK = 0.02
 # Relative accuracy asked of the adaptive integration over each face.
 INTEGRATION = 1e-10
 
@@ -126,7 +129,7 @@ class Topology:
         for k, (e, _) in enumerate(kept):
             a, b = TopExp.FirstVertex_s(TopoDS.Edge(e)), TopExp.LastVertex_s(TopoDS.Edge(e))
             for v in (a, b):
-                ends.setdefault(vertices.Add(v), []).append(k)
+                ends.setdefault(vertices.Add(v), []).append((k, tangent(TopoDS.Edge(e), v)))
         chain = list(range(len(kept)))
 
         def root(k):
@@ -136,8 +139,9 @@ class Topology:
 
         corners = 0
         for at in ends.values():
-            if len(at) == 2 and kept[at[0]][1] == kept[at[1]][1]:
-                chain[root(at[0])] = root(at[1])
+            (k, t), (m, u) = at[0], at[-1]
+            if len(at) == 2 and kept[k][1] == kept[m][1] and norm(cross(t, u)) < KINK:
+                chain[root(k)] = root(m)
             else:
                 corners += 1
         return len({root(k) for k in range(len(kept))}), corners
@@ -151,6 +155,13 @@ def boundary(face, known):
         if edge.Orientation() in (TopAbs_FORWARD, TopAbs_REVERSED) and known.Contains(edge):
             yield known.FindIndex(edge) - 1
         walk.Next()
+
+
+def tangent(edge, vertex):
+    """Direction of the edge at one of its ends."""
+    p, d = gp_Pnt(), gp_Vec()
+    BRepAdaptor_Curve(edge).D1(BRep_Tool.Parameter_s(vertex, edge), p, d)
+    return xyz(d.Normalized())
 
 
 def length(edge):

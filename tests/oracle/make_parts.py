@@ -65,7 +65,7 @@ def judge(part, placed):
     if first.solids == 0:
         return None, "empty"
     if first.solids > 1:
-        return first, "pieces"
+        return first, "unsure: pieces touch" if touching.line(part) or touching.faces(shape) else "pieces"
     if not first.valid or first.ragged or set(first.faces) - set(figures.KINDS):
         return None, f"unsure {first}"
     if first.shortest < SHORT:
@@ -73,8 +73,10 @@ def judge(part, placed):
     second = figures.measure(part.occ(placed, one_by_one=True))
     if not (second.valid and first.same_as(second, TWICE)):
         return None, f"differs {first} {second}"
-    if touching.line(part) or touching.faces(shape):
+    if touching.line(part):
         return first, "touching"
+    if touching.faces(shape):
+        return None, "unsure: faces touch"
     counted = estimate(part, *figures.bounds(shape))
     if abs(counted - first.volume) > ESTIMATE * first.volume:
         return None, f"estimate {counted / first.volume - 1:.1e} {first}"
