@@ -73,13 +73,13 @@ def judge(part, placed):
     second = figures.measure(part.occ(placed, one_by_one=True))
     if not (second.valid and first.same_as(second, TWICE)):
         return None, f"differs {first} {second}"
+    counted = estimate(part, *figures.bounds(shape))
+    if abs(counted - first.volume) > ESTIMATE * first.volume:
+        return None, f"estimate {counted / first.volume - 1:.1e} {first}"
     if touching.line(part):
         return first, "touching"
     if touching.faces(shape):
         return None, "unsure: faces touch"
-    counted = estimate(part, *figures.bounds(shape))
-    if abs(counted - first.volume) > ESTIMATE * first.volume:
-        return None, f"estimate {counted / first.volume - 1:.1e} {first}"
     return first, None
 
 
@@ -117,7 +117,8 @@ def make(family, wanted, out, log):
             kept += 1
         elif refused.get(why, 0) and len(part.features) > 1:
             refused[why] -= 1
-            write(out, part, index, f"= {CODES[why]}")
+            touches = f"{line(result)} or " if why == "touching" else "= "
+            write(out, part, index, touches + CODES[why])
 
 
 def main():
