@@ -6,6 +6,7 @@
 
 use super::ring::{Chart, Node, Ring, nearest};
 use super::{Surface, tolerance};
+use nalgebra::Point3;
 
 /// A face as a polygon, counter-clockwise in the chart, with holes.
 #[derive(Debug, Clone)]
@@ -43,6 +44,15 @@ impl Outline {
         });
         let holes = placed.collect::<Option<Vec<_>>>()?;
         Some(Outline { outer, holes })
+    }
+
+    /// Chart coordinates of a point, moved by whole periods into the outline; `None` when it lies in no period of it.
+    pub fn inside(&self, chart: &Chart, p: &Point3<f64>) -> Option<[f64; 2]> {
+        let [u, v] = chart.uv(p);
+        let [width, height] = chart.periods().map(|p| p.unwrap_or(0.0));
+        let turns = [0.0, 1.0, -1.0, 2.0, -2.0];
+        let mut places = turns.iter().flat_map(|k| turns.iter().map(move |l| [u + k * width, v + l * height]));
+        places.find(|[u, v]| self.crossings(*v).partition_point(|c| c < u) % 2 == 1)
     }
 
     /// The u, ascending, at which the outline crosses the height v: what lies after an odd number of them is inside.

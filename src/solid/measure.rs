@@ -56,7 +56,12 @@ impl Run<'_> {
                 (centre - from).cross(&chord) + axis.into_inner() * (radius * radius * (b - a))
             }
             Locus::Ellipse { centre, major, minor } => (centre - from).cross(&chord) + major.cross(minor) * (b - a),
-            Locus::Traced(_) => self.sum(|p, motion| (p - from).cross(&motion)),
+            Locus::Traced(curve) => {
+                // The cubic ends a hair's breadth from the corners: straight steps lead there.
+                let ends = [a, b].map(|t| (self.locus.at(t) - from, curve.cubic(t).0 - from));
+                let gaps = ends[0].0.cross(&ends[0].1) + ends[1].1.cross(&ends[1].0);
+                gaps + self.sum(|p, motion| (p - from).cross(&motion))
+            }
         };
         swept * (self.way() / 2.0)
     }
@@ -98,7 +103,7 @@ impl Run<'_> {
 /// Flux through the face left of its loops, seen from its outward side, from the point `from`.
 pub(super) fn flux(surface: &Surface, outward: bool, loops: &[Vec<Run>], from: &Point3<f64>) -> Flux {
     let sense = if outward { 1.0 } else { -1.0 };
-    let vector: Vector3<f64> = loops.iter().flatten().map(|run| run.vector_area(&surface.origin())).sum();
+    let vector: Vector3<f64> = loops.iter().map(|runs| vector_area(runs)).sum();
     let offset = surface.origin() - from;
     // The area, and the integral over it of the distance of the tangent plane from the surface's origin: p·n = offset·n +
     // that.
@@ -117,6 +122,14 @@ pub(super) fn flux(surface: &Surface, outward: bool, loops: &[Vec<Run>], from: &
     };
     // The vector area already points outwards, for it follows the loops.
     Flux { area, volume: (offset.dot(&vector) + own * sense) / 3.0 }
+}
+
+/// `½ ∮ r × dr` round a loop. It is the same from any point; from one of its own the small gaps between a cubic and the
+/// corners it should end at weigh least.
+fn vector_area(runs: &[Run]) -> Vector3<f64> {
+    let Some(first) = runs.first() else { return Vector3::zeros() };
+    let from = first.locus.at(first.span[0]);
+    runs.iter().map(|run| run.vector_area(&from)).sum()
 }
 
 /// `value` moved by whole amounts of `most` to more than zero and at most `most`: a face that holds a pole, or goes round

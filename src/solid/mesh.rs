@@ -16,12 +16,66 @@ use std::collections::HashMap;
 /// Triangulates every face; the error is the index of a face whose outline crosses itself.
 pub(super) fn triangulate(solid: &Solid, quality: &Quality) -> Result<TriMesh, usize> {
     let offsets = offsets(solid.vertices.len(), &solid.edges);
-    let mut mesh = TriMesh { positions: positions(solid), ..TriMesh::default() };
-    for face in 0..solid.faces.len() {
-        let patch = patch(solid, face, &offsets, quality, &mut mesh.positions).ok_or(face)?;
-        fill(solid, face, &patch, &mut mesh).ok_or(face)?;
+    let mut wanted: Vec<Vec<Point3<f64>>> = vec![Vec::new(); solid.faces.len()];
+    let mut open = 0;
+    for _ in 0..ROUNDS {
+        let mut mesh = TriMesh { positions: positions(solid), ..TriMesh::default() };
+        for (face, wanted) in wanted.iter().enumerate() {
+            let patch = patch(solid, face, &offsets, quality, wanted, &mut mesh.positions).ok_or(face)?;
+            fill(solid, face, &patch, &mut mesh).ok_or(face)?;
+        }
+        let sides = Sides::of(&mesh);
+        if let Some(face) = sides.open() {
+            return Err(face);
+        }
+        let doubled = sides.doubled();
+        if doubled.is_empty() {
+            return Ok(mesh);
+        }
+        // Two faces round the same few edges have the same diagonals: one of them gets a node in the middle of each.
+        for (a, b, faces) in doubled {
+            let curved = |f: &&usize| !matches!(solid.surface(**f), Surface::Plane { .. });
+            let Some(&face) = faces.iter().rev().find(curved) else { return Err(faces[0]) };
+            wanted[face].push(nalgebra::center(&mesh.positions[a as usize], &mesh.positions[b as usize]));
+            open = face;
+        }
     }
-    Ok(mesh)
+    Err(open)
+}
+
+/// How often diagonals that two faces have in common are looked for.
+const ROUNDS: usize = 6;
+
+/// The directed sides of all triangles, sorted, with their faces.
+struct Sides(Vec<(u32, u32, usize)>);
+
+impl Sides {
+    fn of(mesh: &TriMesh) -> Sides {
+        let sides = |(t, face): (&[u32; 3], &u32)| [0, 1, 2].map(|k| (t[k], t[(k + 1) % 3], *face as usize));
+        let mut all: Vec<_> = mesh.triangles.iter().zip(&mesh.faces).flat_map(sides).collect();
+        all.sort_unstable();
+        Sides(all)
+    }
+
+    /// Sides from `a` to `b`.
+    fn between(&self, a: u32, b: u32) -> &[(u32, u32, usize)] {
+        let from = self.0.partition_point(|s| (s.0, s.1) < (a, b));
+        let to = self.0.partition_point(|s| (s.0, s.1) <= (a, b));
+        &self.0[from..to]
+    }
+
+    /// A face with a side that no triangle goes back along.
+    fn open(&self) -> Option<usize> {
+        let unpaired = |s: &&(u32, u32, usize)| self.between(s.0, s.1).len() != self.between(s.1, s.0).len();
+        self.0.iter().find(unpaired).map(|s| s.2)
+    }
+
+    /// Sides that more than one triangle has, once for both directions, with the faces.
+    fn doubled(&self) -> Vec<(u32, u32, Vec<usize>)> {
+        let groups = self.0.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1));
+        let twice = groups.filter(|g| g.len() > 1 && g[0].0 < g[0].1);
+        twice.map(|g| (g[0].0, g[0].1, g.iter().map(|s| s.2).collect())).collect()
+    }
 }
 
 /// Corners, then the inner samples of every edge, as [`offsets`] counts them.
@@ -47,6 +101,7 @@ fn patch<'a>(
     face: usize,
     offsets: &[u32],
     quality: &Quality,
+    wanted: &[Point3<f64>],
     positions: &mut Vec<Point3<f64>>,
 ) -> Option<Patch<'a>> {
     let (chart, rings) = rings(solid, face, offsets)?;
@@ -55,7 +110,11 @@ fn patch<'a>(
         positions.len() as u32 - 1
     };
     let outline = Outline::new(&chart, &rings, &mut Grid { steps: steps(&chart, &rings, quality), fresh: &mut fresh })?;
-    let inner = inner_nodes(&chart, &outline, quality, &mut fresh);
+    let mut inner = inner_nodes(&chart, &outline, quality, &mut fresh);
+    inner.extend(wanted.iter().filter_map(|p| {
+        let uv = outline.inside(&chart, p)?;
+        Some(Node { uv, id: fresh(uv) })
+    }));
     Some(Patch { chart, outline, inner })
 }
 

@@ -17,7 +17,7 @@ pub(super) struct Chart<'a> {
 }
 
 impl Chart<'_> {
-    fn uv(&self, p: &Point3<f64>) -> [f64; 2] {
+    pub fn uv(&self, p: &Point3<f64>) -> [f64; 2] {
         let [u, v] = self.surface.chart(p);
         if self.turned { [v, -u] } else { [u, v] }
     }

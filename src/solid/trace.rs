@@ -232,10 +232,10 @@ struct Walk<'a> {
 /// A point of a curve with its unit tangent.
 type Place = (Point3<f64>, Vector3<f64>);
 
-/// Largest turn of a step (rad), and least and greatest distance (mm) of the middle of a step from its cubic for which
+/// Largest turn of a step (rad), and least and greatest distance (mm) of a step from its cubic for which
 /// the step is taken and the next may be longer.
 const LARGEST_TURN: f64 = 0.08;
-const STRAIGHT: (f64, f64) = (2e-7, 1e-6);
+const STRAIGHT: (f64, f64) = (1e-8, 1e-7);
 /// Shortest step (mm), longest step as a share of the room, most steps.
 const SHORTEST: f64 = 1e-6;
 const LONGEST: f64 = 1.0 / 16.0;
@@ -319,9 +319,13 @@ impl Walk<'_> {
         if here.1.dot(&next.1) < LARGEST_TURN.cos() {
             return None;
         }
-        let middle = cubic((&here.0, &here.1), (&next.0, &next.1), 0.5).0;
-        let stray = (onto(self.surfaces, middle) - middle).norm();
-        (stray < STRAIGHT.1).then_some(stray)
+        let stray = |share: f64| {
+            let place = cubic((&here.0, &here.1), (&next.0, &next.1), share).0;
+            (onto(self.surfaces, place) - place).norm()
+        };
+        // Off the middle too: a curve whose bend changes strays to both sides and crosses its cubic half way.
+        let worst = [0.25, 0.6].into_iter().map(stray).fold(0.0, f64::max);
+        (worst < STRAIGHT.1).then_some(worst)
     }
 
     fn on_both(&self, p: &Point3<f64>) -> bool {

@@ -150,10 +150,18 @@ impl Traced {
                 continue;
             }
             let t = self.parameter_in(segment, p);
-            let passes = (self.cubic(t).0 - p).norm() < PASSES;
-            let again = found.iter().any(|f| (self.cubic((f + t) / 2.0).0 - p).norm() < PASSES && (f - t).abs() < 1.0);
-            if passes && !again {
-                found.push(t);
+            let off = |t: f64| (self.cubic(t).0 - p).norm();
+            if off(t) >= PASSES {
+                continue;
+            }
+            // By a point of the curve both segments there pass: the nearer one is right.
+            match found.last_mut() {
+                Some(last) if t - *last < 1.0 && off((*last + t) / 2.0) < PASSES => {
+                    if off(t) < off(*last) {
+                        *last = t;
+                    }
+                }
+                _ => found.push(t),
             }
         }
         if self.closed {

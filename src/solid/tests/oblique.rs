@@ -394,3 +394,38 @@ fn planes_may_touch_a_torus_and_faces_may_not_touch_along_a_circle() {
         vec![one("slab", Op::Add, block(10.0, 10.0, 5.0), 0.0), one("slot", Op::Cut, block(4.0, 10.000002, 2.0), 3.0)];
     assert_eq!(faults(skin), ["E0406"]);
 }
+
+#[test]
+fn a_lens_and_a_far_wedge_are_exact_wherever_they_stand() {
+    let quarter = PI / 2.0;
+    let lens = vec![
+        feature("ring", Op::Add, vec![at(torus(8.0, 2.0), [2.0, -1.0, 0.0], [0.0, quarter, 0.0])]),
+        feature("point", Op::Keep, vec![at(cone(0.0, 6.0, 1.0), [2.0, -2.0, 0.0], [0.0, quarter, 0.0])]),
+    ];
+    // So thin that its triangles, coarse as they are, hold much less; but they close.
+    for lens in [lens.clone(), moved(&lens)] {
+        let s = evaluate(&part(lens), &[], &Quality::default()).unwrap();
+        assert!((s.volume - 0.04666325).abs() < 1e-7, "{}", s.volume);
+        assert_eq!((s.counts().tori, s.counts().cones, s.counts().edges), (1, 1, 1));
+    }
+    let sides = [("1", [1.0, 0.0], None), ("2", [1.0, 2.0], Some((2.0, true))), ("3", [-1.0, 2.0], None)];
+    let mut tongue = outline([-1.0, 0.0], &sides);
+    tongue.sides[2].corner = Corner::Round(number(0.5));
+    let wedge = vec![
+        feature("cone", Op::Add, vec![at(cone(4.0, 10.0, 2.0), [1.0, 3.0, 1.0], [0.0; 3])]),
+        feature(
+            "tongue",
+            Op::Keep,
+            vec![at(Shape::Prism { outline: tongue, h: length(3.0) }, [2.0, -3.0, 0.0], [0.0; 3])],
+        ),
+    ];
+    let [given, turned] = [wedge.clone(), moved(&wedge)].map(|f| evaluate(&part(f), &[], &Quality::default()).unwrap());
+    assert!((given.volume / turned.volume - 1.0).abs() < 1e-7, "{} {}", given.volume, turned.volume);
+    // The flat side is cut off by a hyperbola, z = 1 + (√((x - 1)² + 16) - 2) / 1.5.
+    let root = |u: f64| u / 2.0 * (u * u + 16.0).sqrt() + 8.0 * (u / 4.0).asinh();
+    let exact = 3.0 - (root(2.0) - root(0.5) - 3.0) / 1.5;
+    for s in [given, turned] {
+        let flat = s.faces.iter().find(|f| f.name == "tongue.3").expect("the side is there");
+        assert!((flat.area - exact).abs() < 1e-6, "{} {exact}", flat.area);
+    }
+}
