@@ -1,7 +1,7 @@
 //! SVG as text: shapes go in, a self-contained file comes out.
 //!
 //! In: shapes in px, y downwards. Out: well-formed XML without scripts, style sheets or references to elsewhere, whose
-//! `viewBox` is what was drawn plus a margin: nothing can lie outside. Coordinates are rounded to [`STEPS`] per px, paths
+//! `viewBox` is what was drawn plus a margin: nothing can lie outside. Coordinates are rounded to a fixed number of steps per px, paths
 //! are written in relative steps of these, so rounding does not add up. Never knows what is drawn.
 
 use std::fmt::Write;
