@@ -46,35 +46,35 @@ pub(super) fn triangulate(solid: &Solid, quality: &Quality) -> Result<TriMesh, u
 /// How often diagonals that two faces have in common are looked for.
 const ROUNDS: usize = 6;
 
-/// The directed sides of all triangles, sorted, with their faces.
-struct Sides(Vec<(u32, u32, usize)>);
+/// One side of a triangle: its lower and higher vertex, whether it runs upwards, and the face.
+type Side = (u32, u32, bool, usize);
+
+/// The sides of all triangles, those between the same vertices together.
+struct Sides(Vec<Side>);
 
 impl Sides {
     fn of(mesh: &TriMesh) -> Sides {
-        let sides = |(t, face): (&[u32; 3], &u32)| [0, 1, 2].map(|k| (t[k], t[(k + 1) % 3], *face as usize));
-        let mut all: Vec<_> = mesh.triangles.iter().zip(&mesh.faces).flat_map(sides).collect();
+        let side = |a: u32, b: u32, face: u32| (a.min(b), a.max(b), a < b, face as usize);
+        let sides = |(t, face): (&[u32; 3], &u32)| [0, 1, 2].map(|k| side(t[k], t[(k + 1) % 3], *face));
+        let mut all: Vec<Side> = mesh.triangles.iter().zip(&mesh.faces).flat_map(sides).collect();
         all.sort_unstable();
         Sides(all)
     }
 
-    /// Sides from `a` to `b`.
-    fn between(&self, a: u32, b: u32) -> &[(u32, u32, usize)] {
-        let from = self.0.partition_point(|s| (s.0, s.1) < (a, b));
-        let to = self.0.partition_point(|s| (s.0, s.1) <= (a, b));
-        &self.0[from..to]
+    fn groups(&self) -> impl Iterator<Item = &[Side]> {
+        self.0.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1))
     }
 
     /// A face with a side that no triangle goes back along.
     fn open(&self) -> Option<usize> {
-        let unpaired = |s: &&(u32, u32, usize)| self.between(s.0, s.1).len() != self.between(s.1, s.0).len();
-        self.0.iter().find(unpaired).map(|s| s.2)
+        let unpaired = |group: &&[Side]| 2 * group.iter().filter(|s| s.2).count() != group.len();
+        self.groups().find(unpaired).map(|group| group[0].3)
     }
 
-    /// Sides that more than one triangle has, once for both directions, with the faces.
+    /// Sides that more than two triangles meet at, with the faces.
     fn doubled(&self) -> Vec<(u32, u32, Vec<usize>)> {
-        let groups = self.0.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1));
-        let twice = groups.filter(|g| g.len() > 1 && g[0].0 < g[0].1);
-        twice.map(|g| (g[0].0, g[0].1, g.iter().map(|s| s.2).collect())).collect()
+        let many = self.groups().filter(|group| group.len() > 2);
+        many.map(|group| (group[0].0, group[0].1, group.iter().map(|s| s.3).collect())).collect()
     }
 }
 
