@@ -1,4 +1,4 @@
-//! Every finding on an assembly, as the user sees it.
+//! Every finding on solids and on an assembly, as the user sees it.
 //!
 //! `tests/findings/*.md` holds pairs of blocks: a fenced `gng` block with the lines of parts and assembly, and a fenced `text`
 //! block with the report. `GONOGO_BLESS=1` rewrites the reports; read the difference before committing it.
@@ -38,10 +38,13 @@ fn findings_are_as_written_down() {
 }
 
 #[test]
-fn every_code_of_the_assembly_is_shown() {
+fn every_code_of_solids_and_assembly_is_shown() {
     let shown: String =
         pages().iter().flat_map(|p| cases(&fs::read_to_string(p).unwrap())).map(|(_, report)| report).collect();
-    for code in ["E0501", "W0502", "E0503", "E0506", "W0507", "E0508", "E0509"] {
+    for code in [
+        "E0401", "E0403", "E0405", "E0406", "E0407", "E0408", "E0501", "W0502", "E0503", "E0506", "W0507", "E0508",
+        "E0509",
+    ] {
         assert!(shown.contains(&format!("[{code}]")), "{code} has no test");
     }
 }
