@@ -394,18 +394,3 @@ fn wheel_has_the_expected_faces() {
         assert_eq!((s.counts().cylinders, s.counts().planes), (24 + 9, 2 + 72));
     }
 }
-
-/// Measures, asserts nothing: `cargo test --lib solid -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-fn speed() {
-    for (name, features) in [("wheel", wheel()), ("gear", gear()), ("plate", plate()), ("moved wheel", moved(&wheel()))]
-    {
-        let part = part(features);
-        let (started, rounds) = (std::time::Instant::now(), 20);
-        for _ in 0..rounds {
-            assert!(evaluate(&part, &[], &Quality::default()).is_ok());
-        }
-        println!("{name}: {:?}", started.elapsed() / rounds);
-    }
-}
