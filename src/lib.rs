@@ -7,6 +7,8 @@
 //!
 //! Every stage is a pure function: no I/O, no clock, no globals, no printing. What is wrong with a spec is data.
 
+#![cfg_attr(not(feature = "c"), forbid(unsafe_code))]
+
 #[cfg(feature = "compile")]
 pub mod diag;
 #[cfg(feature = "compile")]
@@ -41,6 +43,8 @@ pub mod variation;
 pub mod view;
 
 // What the machine on the line needs.
+#[cfg(feature = "c")]
+mod ffi;
 pub mod runtime;
 
 #[cfg(feature = "compile")]

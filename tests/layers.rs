@@ -10,6 +10,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("diag", &[]),
     ("iso", &["units"]),
     ("runtime", &[]),
+    ("ffi", &["runtime"]),
     ("syntax", &["diag"]),
     ("design", &["syntax", "iso", "diag", "units"]),
     ("variation", &["design", "rng", "units"]),
@@ -108,6 +109,15 @@ fn only_the_command_line_prints_and_knows_files_and_clocks() {
         broken.extend(said.map(|word| format!("{}: {word}", source.path)));
     }
     assert!(broken.is_empty(), "{broken:#?}");
+}
+
+#[test]
+fn only_the_c_interface_may_be_unsafe() {
+    for source in sources() {
+        let told = names(&source.code, "unsafe ") || names(&source.code, "unsafe_code");
+        let may = ["ffi.rs", "lib.rs"].contains(&source.path.as_str());
+        assert!(may || !told, "{} speaks of unsafe", source.path);
+    }
 }
 
 #[test]

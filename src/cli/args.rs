@@ -146,8 +146,18 @@ pub struct Calibrate {
 #[derive(Debug, Args)]
 pub struct Inspect {
     pub model: PathBuf,
-    #[arg(required = true)]
+    /// Photos, folders of photos, or `-` for standard input: an image, or the names of photos, one a line.
+    #[arg(value_name = "PHOTO", required_unless_present = "watch")]
     pub photos: Vec<PathBuf>,
+    /// After these, judge every photo that appears in DIR, once it is completely written.
+    #[arg(long, value_name = "DIR")]
+    pub watch: Option<PathBuf>,
+    /// Stop watching after so many photos.
+    #[arg(long, value_name = "N", requires = "watch")]
+    pub for_count: Option<u64>,
+    /// Stop watching when this file exists and all photos that were there are judged.
+    #[arg(long, value_name = "FILE", requires = "watch")]
+    pub until: Option<PathBuf>,
     /// The station's calibration; without it the lamps and the camera are taken to be as the spec says.
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,

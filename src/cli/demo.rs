@@ -39,7 +39,7 @@ pub fn demo(args: &Demo, global: &Global) -> Result<Exit, Failure> {
     let labels = labels(&photos.join(LABELS))?;
     let mut mistakes = 0;
     for label in &labels {
-        let agrees = judge_one(args, &model, &inspector, &photos, label)?;
+        let agrees = judge_one(args, &inspector, &photos, label)?;
         mistakes += usize::from(!agrees);
     }
     let total = labels.len();
@@ -112,9 +112,9 @@ fn label(line: &str) -> Option<Label> {
 }
 
 /// Judges a photo, prints its line and writes its overlay; whether the verdict agrees with the label.
-fn judge_one(args: &Demo, model: &Model, inspector: &Inspector, photos: &Path, label: &Label) -> Result<bool, Failure> {
+fn judge_one(args: &Demo, inspector: &Inspector, photos: &Path, label: &Label) -> Result<bool, Failure> {
     let path = photos.join(&label.photo);
-    let (outcome, bytes) = judge::judge(model, inspector, &path);
+    let (outcome, bytes) = judge::judge(inspector, &path);
     if let Some(bytes) = bytes {
         judge::write_overlay(&args.out, &path, &bytes, &outcome)?;
     }

@@ -2,16 +2,19 @@
 
 use super::Exit;
 use super::args::{Calibrate, Inspect, VerdictFormat};
-use super::output::{self, Failure};
+use super::output::{self, DASH, Failure};
 use super::overlay;
+use super::photos::{self, End, Watch};
 use super::verdict::{self, Outcome};
 use crate::runtime::calibrate::{self, Calibration};
 use crate::runtime::inspect::{Decision, Inspector};
 use crate::runtime::model::Model;
-use crate::runtime::photo::Photo;
+use crate::runtime::photo::{Photo, PhotoError};
+use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 use std::fs;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Fits a model to its station.
@@ -35,57 +38,114 @@ pub fn calibrate(args: &Calibrate) -> Result<Exit, Failure> {
 pub fn inspect(args: &Inspect) -> Result<Exit, Failure> {
     let model = read_model(&args.model)?;
     let calibration = calibration(args, &model)?;
+    let listed = photos::listed(&args.photos)?;
+    let overlays = args.overlay.as_deref().map(|dir| Overlays::new(dir, &listed)).transpose()?;
+    let watch = args.watch.as_deref().map(Watch::new).transpose()?;
     let inspector = inspector(&model, &calibration)?;
-    if let Some(dir) = &args.overlay {
-        output::make_dir(dir)?;
-        distinct_stems(args)?;
+    let mut desk = Desk { inspector, format: args.format, overlays, outcomes: Vec::new(), worst: None };
+    for path in &listed {
+        if path == Path::new(DASH) {
+            photos::standard_input(|name, bytes| desk.take(name, bytes.map_or_else(|| output::read_file(name), Ok)))?;
+        } else {
+            desk.take(path, output::read_file(path))?;
+        }
     }
-    let mut outcomes = Vec::new();
-    for path in &args.photos {
-        let (outcome, bytes) = judge(&model, &inspector, path);
-        if let (Some(dir), Some(bytes)) = (&args.overlay, bytes) {
-            write_overlay(dir, path, &bytes, &outcome)?;
-        }
-        match args.format {
-            VerdictFormat::Human => output::line(&verdict::human(&outcome))?,
-            VerdictFormat::Json => output::line(&verdict::json(&outcome))?,
-            VerdictFormat::Junit => {}
-        }
-        outcomes.push(outcome);
+    if let Some(mut watch) = watch {
+        let end = End { after: args.for_count, once_there: args.until.as_deref() };
+        watch.run(&end, |path, bytes, patient| desk.take_if_complete(path, bytes, patient))?;
     }
     if args.format == VerdictFormat::Junit {
-        output::line(&verdict::junit(&format!("{}.{}", model.assembly, model.station.name), &outcomes))?;
+        output::line(&verdict::junit(&format!("{}.{}", model.assembly, model.station.name), &desk.outcomes))?;
     }
-    Ok(exit(outcomes.iter().map(|o| o.verdict.decision)))
+    Ok(desk.worst.unwrap_or(Exit::Trouble))
+}
+
+/// Where photos are judged and verdicts written.
+struct Desk<'a> {
+    inspector: Inspector<'a>,
+    format: VerdictFormat,
+    overlays: Option<Overlays>,
+    /// For the one report at the end.
+    outcomes: Vec<Outcome>,
+    worst: Option<Exit>,
+}
+
+impl Desk<'_> {
+    fn take(&mut self, path: &Path, bytes: io::Result<Vec<u8>>) -> Result<(), Failure> {
+        let name = path.display().to_string();
+        match bytes {
+            Ok(bytes) => {
+                let outcome = judge_bytes(&self.inspector, name, &bytes);
+                self.put(path, outcome, Some(&bytes))
+            }
+            Err(e) => self.put(path, Outcome::unreadable(name, format!("cannot read the file: {e}")), None),
+        }
+    }
+
+    /// Judges a photo, unless it is none yet and there is time to wait.
+    fn take_if_complete(&mut self, path: &Path, bytes: Vec<u8>, patient: bool) -> Result<bool, Failure> {
+        let (start, photo) = (Instant::now(), decode(&self.inspector, &bytes));
+        if patient && matches!(photo, Err(PhotoError::Unreadable(_))) {
+            return Ok(false);
+        }
+        let outcome = judged(&self.inspector, path.display().to_string(), photo, start);
+        self.put(path, outcome, Some(&bytes))?;
+        Ok(true)
+    }
+
+    fn put(&mut self, path: &Path, outcome: Outcome, bytes: Option<&[u8]>) -> Result<(), Failure> {
+        if let (Some(overlays), Some(bytes)) = (&mut self.overlays, bytes) {
+            overlays.admit(path)?;
+            write_overlay(&overlays.dir, path, bytes, &outcome)?;
+        }
+        self.worst = self.worst.max(Some(exit_of(outcome.verdict.decision)));
+        match self.format {
+            VerdictFormat::Human => output::line(&verdict::human(&outcome)),
+            VerdictFormat::Json => output::line(&outcome.json()),
+            VerdictFormat::Junit => {
+                self.outcomes.push(outcome);
+                Ok(())
+            }
+        }
+    }
 }
 
 /// 0 all go, 1 any no-go, 2 any that could not be judged, whatever the others are.
-pub fn exit(decisions: impl Iterator<Item = Decision>) -> Exit {
-    let of_one = |decision| match decision {
+fn exit_of(decision: Decision) -> Exit {
+    match decision {
         Decision::Go => Exit::Fine,
         Decision::NoGo => Exit::Faults,
         Decision::CannotInspect => Exit::Trouble,
-    };
-    decisions.map(of_one).max().unwrap_or(Exit::Trouble)
+    }
 }
 
 /// Judges the photo in a file; its bytes as well, if there are any.
-pub fn judge(model: &Model, inspector: &Inspector, path: &Path) -> (Outcome, Option<Vec<u8>>) {
+pub fn judge(inspector: &Inspector, path: &Path) -> (Outcome, Option<Vec<u8>>) {
     let name = path.display().to_string();
-    let bytes = match fs::read(path) {
-        Ok(bytes) => bytes,
-        Err(e) => return (Outcome::unreadable(name, format!("cannot read the file: {e}")), None),
-    };
+    match output::read_file(path) {
+        Ok(bytes) => (judge_bytes(inspector, name, &bytes), Some(bytes)),
+        Err(e) => (Outcome::unreadable(name, format!("cannot read the file: {e}")), None),
+    }
+}
+
+fn judge_bytes(inspector: &Inspector, name: String, bytes: &[u8]) -> Outcome {
     let start = Instant::now();
-    let station = &model.station;
-    let outcome = match Photo::decode(&bytes, station.tone, station.camera.size) {
+    judged(inspector, name, decode(inspector, bytes), start)
+}
+
+fn decode(inspector: &Inspector, bytes: &[u8]) -> Result<Photo, PhotoError> {
+    let station = &inspector.model().station;
+    Photo::decode(bytes, station.tone, station.camera.size)
+}
+
+fn judged(inspector: &Inspector, name: String, photo: Result<Photo, PhotoError>, start: Instant) -> Outcome {
+    match photo {
         Ok(photo) => {
             let verdict = inspector.inspect(&photo);
-            Outcome { photo: name, verdict, milliseconds: start.elapsed().as_secs_f64() * 1e3 }
+            Outcome { photo: name, verdict, milliseconds: Some(start.elapsed().as_secs_f64() * 1e3) }
         }
         Err(e) => Outcome::unreadable(name, e.to_string()),
-    };
-    (outcome, Some(bytes))
+    }
 }
 
 /// The overlay of a judged photo as `DIR/<stem>.png`; a photo that cannot be decoded has none.
@@ -102,28 +162,41 @@ fn overlay_name(photo: &Path) -> OsString {
     name
 }
 
-/// Two photos must not end in one overlay, and no overlay on its own photo.
-fn distinct_stems(args: &Inspect) -> Result<(), Failure> {
-    let Some(dir) = &args.overlay else { return Ok(()) };
-    let mut seen: Vec<OsString> = Vec::new();
-    for photo in &args.photos {
+/// A folder of overlays. Two photos must not end in one overlay, and no overlay on its own photo.
+struct Overlays {
+    dir: PathBuf,
+    /// By name of the overlay, the photo under it.
+    photos: BTreeMap<OsString, PathBuf>,
+}
+
+impl Overlays {
+    /// What is known to go wrong goes wrong before the first photo is judged.
+    fn new(dir: &Path, photos: &[PathBuf]) -> Result<Overlays, Failure> {
+        output::make_dir(dir)?;
+        let mut overlays = Overlays { dir: dir.to_path_buf(), photos: BTreeMap::new() };
+        photos.iter().filter(|p| *p != Path::new(DASH)).try_for_each(|photo| overlays.admit(photo))?;
+        overlays.photos.clear();
+        Ok(overlays)
+    }
+
+    fn admit(&mut self, photo: &Path) -> Result<(), Failure> {
         let name = overlay_name(photo);
-        let itself = fs::canonicalize(photo).ok().zip(fs::canonicalize(dir.join(&name)).ok());
+        let itself = fs::canonicalize(photo).ok().zip(fs::canonicalize(self.dir.join(&name)).ok());
         if itself.is_some_and(|(photo, overlay)| photo == overlay) {
             return Err(Failure(format!(
                 "the overlay of `{}` would overwrite it: choose another folder",
                 photo.display()
             )));
         }
-        if seen.contains(&name) {
+        let before = self.photos.insert(name.clone(), photo.to_path_buf());
+        if before.is_some_and(|before| before != photo) {
             let name = name.to_string_lossy();
             return Err(Failure(format!(
                 "several photos would have the overlay `{name}`: judge them one folder at a time"
             )));
         }
-        seen.push(name);
+        Ok(())
     }
-    Ok(())
 }
 
 pub fn read_model(path: &Path) -> Result<Model, Failure> {
@@ -169,11 +242,10 @@ mod tests {
 
     #[test]
     fn trouble_outweighs_faults_and_faults_outweigh_go() {
-        let of = |decisions: &[Decision]| exit(decisions.iter().copied());
-        assert_eq!(of(&[Decision::Go, Decision::Go]), Exit::Fine);
-        assert_eq!(of(&[Decision::Go, Decision::NoGo]), Exit::Faults);
-        assert_eq!(of(&[Decision::NoGo, Decision::CannotInspect, Decision::Go]), Exit::Trouble);
-        assert_eq!(of(&[]), Exit::Trouble);
+        let of = |decisions: &[Decision]| decisions.iter().copied().map(exit_of).max();
+        assert_eq!(of(&[Decision::Go, Decision::Go]), Some(Exit::Fine));
+        assert_eq!(of(&[Decision::Go, Decision::NoGo]), Some(Exit::Faults));
+        assert_eq!(of(&[Decision::NoGo, Decision::CannotInspect, Decision::Go]), Some(Exit::Trouble));
     }
 
     #[test]

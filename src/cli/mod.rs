@@ -12,6 +12,7 @@ mod judge;
 mod messages;
 mod output;
 mod overlay;
+mod photos;
 mod progress;
 pub mod report;
 mod verdict;

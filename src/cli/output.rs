@@ -19,13 +19,24 @@ pub const DASH: &str = "-";
 
 /// The bytes of a file, or of standard input for `-`.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    let mut bytes = Vec::new();
-    let outcome = if path == Path::new(DASH) {
-        io::stdin().lock().read_to_end(&mut bytes).map(|_| bytes)
-    } else {
-        fs::read(path)
-    };
+    let outcome = if path == Path::new(DASH) { read_all(io::stdin().lock()) } else { read_file(path) };
     outcome.map_err(|e| Failure::at(path, "read", &e))
+}
+
+/// The bytes of a file.
+pub fn read_file(path: &Path) -> io::Result<Vec<u8>> {
+    fs::File::open(path).and_then(read_all)
+}
+
+/// All there is to read, but no more than any file of ours has: a device may have no end.
+pub fn read_all(from: impl Read) -> io::Result<Vec<u8>> {
+    const MOST: u64 = 1 << 30;
+    let mut bytes = Vec::new();
+    from.take(MOST + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MOST {
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "it is larger than 1 GiB"));
+    }
+    Ok(bytes)
 }
 
 /// The text of a file, or of standard input for `-`.

@@ -1,92 +1,9 @@
-//! Verdicts as text: for people, as JSON lines, as JUnit.
+//! Verdicts as text: for people and as JUnit. The JSON is the runtime's own.
 //!
-//! In: the name of a photo and what came of it. Out: text. The keys of the JSON are a contract; scripts depend on them.
+//! In: the name of a photo and what came of it. Out: text.
 
-use crate::runtime::inspect::{Decision, Finding, Verdict};
-use serde::Serialize;
-
-/// What came of one photo.
-pub struct Outcome {
-    pub photo: String,
-    pub verdict: Verdict,
-    /// Time of judging, the model being loaded.
-    pub milliseconds: f64,
-}
-
-impl Outcome {
-    /// A photo that never reached the inspector.
-    pub fn unreadable(photo: String, reason: String) -> Outcome {
-        let verdict = Verdict {
-            decision: Decision::CannotInspect,
-            reason,
-            pose: None,
-            scale: 1.0,
-            locator_score: 0.0,
-            findings: Vec::new(),
-            nodes: Vec::new(),
-            outline: None,
-        };
-        Outcome { photo, verdict, milliseconds: 0.0 }
-    }
-}
-
-/// The word in reports.
-pub fn word(decision: Decision) -> &'static str {
-    match decision {
-        Decision::Go => "go",
-        Decision::NoGo => "no-go",
-        Decision::CannotInspect => "cannot-inspect",
-    }
-}
-
-#[derive(Serialize)]
-struct JsonLine<'a> {
-    photo: &'a str,
-    verdict: Decision,
-    reason: &'a str,
-    pose: Option<JsonPose>,
-    findings: Vec<Finding>,
-    milliseconds: f64,
-}
-
-/// Where the assembly stands on the station: mm and degrees; size relative to the nominal photo.
-#[derive(Serialize)]
-struct JsonPose {
-    x: f64,
-    y: f64,
-    scale: f64,
-    rotation_deg: f64,
-}
-
-/// One JSON object, without the line break.
-pub fn json(outcome: &Outcome) -> String {
-    let verdict = &outcome.verdict;
-    let pose = verdict.pose.map(|p| JsonPose {
-        x: rounded(p.x, 4),
-        y: rounded(p.y, 4),
-        scale: rounded(verdict.scale, 5),
-        rotation_deg: rounded(p.rz.to_degrees(), 4),
-    });
-    let line = JsonLine {
-        photo: &outcome.photo,
-        verdict: verdict.decision,
-        reason: &verdict.reason,
-        pose,
-        findings: verdict.findings.iter().map(finding).collect(),
-        milliseconds: rounded(outcome.milliseconds, 3),
-    };
-    serde_json::to_string(&line).unwrap_or_else(|e| format!("{{\"verdict\":\"cannot-inspect\",\"reason\":\"{e}\"}}"))
-}
-
-fn finding(finding: &Finding) -> Finding {
-    let box_px = finding.box_px.map(|v| rounded(v, 1));
-    Finding { p_value: rounded(finding.p_value, 6), box_px, ..finding.clone() }
-}
-
-fn rounded(value: f64, decimals: i32) -> f64 {
-    let scale = 10f64.powi(decimals);
-    (value * scale).round() / scale + 0.0
-}
+use crate::runtime::inspect::Decision;
+pub use crate::runtime::report::{Outcome, word};
 
 /// One line for people.
 pub fn human(outcome: &Outcome) -> String {
@@ -109,7 +26,7 @@ pub fn human(outcome: &Outcome) -> String {
 pub fn junit(station: &str, outcomes: &[Outcome]) -> String {
     let count = |decision| outcomes.iter().filter(|o| o.verdict.decision == decision).count();
     let seconds = |ms: f64| format!("{:.6}", ms / 1000.0);
-    let total: f64 = outcomes.iter().map(|o| o.milliseconds).sum();
+    let total: f64 = outcomes.iter().filter_map(|o| o.milliseconds).sum();
     let name = escaped(station);
     let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     text += &format!(
@@ -121,7 +38,10 @@ pub fn junit(station: &str, outcomes: &[Outcome]) -> String {
     );
     for outcome in outcomes {
         let (photo, reason) = (escaped(&outcome.photo), escaped(&outcome.verdict.reason));
-        text += &format!("<testcase classname=\"{name}\" name=\"{photo}\" time=\"{}\"", seconds(outcome.milliseconds));
+        text += &format!(
+            "<testcase classname=\"{name}\" name=\"{photo}\" time=\"{}\"",
+            seconds(outcome.milliseconds.unwrap_or(0.0))
+        );
         text += &match outcome.verdict.decision {
             Decision::Go => "/>\n".to_string(),
             Decision::NoGo => format!("><failure message=\"{reason}\"/></testcase>\n"),
@@ -150,6 +70,7 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::runtime::inspect::Finding;
     use crate::runtime::pose::Pose;
 
     fn faulty() -> Outcome {
@@ -165,26 +86,8 @@ mod tests {
         outcome.verdict.decision = Decision::NoGo;
         outcome.verdict.pose = Some(Pose { x: 1.0, y: -2.0, z: 0.0, rz: 0.1 });
         outcome.verdict.findings.push(finding);
-        outcome.milliseconds = 12.3;
+        outcome.milliseconds = Some(12.3);
         outcome
-    }
-
-    #[test]
-    fn the_json_line_keeps_its_keys_in_order() {
-        let expected = concat!(
-            r#"{"photo":"a \"b\".png","verdict":"no-go","reason":"pin[2]: missing","#,
-            r#""pose":{"x":1.0,"y":-2.0,"scale":1.0,"rotation_deg":5.7296},"#,
-            r#""findings":[{"component":"pin[2]","fault":"missing","error_tree":"pin[2]","node":"pin[2]","#,
-            r#""p_value":0.0004,"box":[1.0,2.0,3.3,4.0]}],"milliseconds":12.3}"#
-        );
-        assert_eq!(json(&faulty()), expected);
-    }
-
-    #[test]
-    fn a_photo_that_cannot_be_read_has_all_keys_too() {
-        let line = json(&Outcome::unreadable("x.png".into(), "no".into()));
-        let expected = r#"{"photo":"x.png","verdict":"cannot-inspect","reason":"no","pose":null,"findings":[],"milliseconds":0.0}"#;
-        assert_eq!(line, expected);
     }
 
     #[test]

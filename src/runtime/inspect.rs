@@ -13,6 +13,7 @@ use super::model::{Model, Node};
 use super::photo::Photo;
 use super::pose::Pose;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// A node of which less is inside the photo cannot be judged.
 const LEAST_INSIDE: f64 = 0.6;
@@ -88,8 +89,8 @@ pub struct Verdict {
 
 /// A model and its calibration, ready to judge photo after photo.
 pub struct Inspector<'a> {
-    model: &'a Model,
-    calibration: &'a Calibration,
+    model: Cow<'a, Model>,
+    calibration: Cow<'a, Calibration>,
     camera: Camera,
     search: Search,
     prepared: Prepared,
@@ -100,8 +101,17 @@ pub struct Inspector<'a> {
 impl<'a> Inspector<'a> {
     /// `None` when the model's camera cannot see its own nodes.
     pub fn new(model: &'a Model, calibration: &'a Calibration) -> Option<Inspector<'a>> {
-        let prepared = Prepared::new(model)?;
-        let drift = drifts(model);
+        Inspector::of(Cow::Borrowed(model), Cow::Borrowed(calibration))
+    }
+
+    /// The same, keeping model and calibration for itself.
+    pub fn owned(model: Model, calibration: Calibration) -> Option<Inspector<'static>> {
+        Inspector::of(Cow::Owned(model), Cow::Owned(calibration))
+    }
+
+    fn of<'m>(model: Cow<'m, Model>, calibration: Cow<'m, Calibration>) -> Option<Inspector<'m>> {
+        let prepared = Prepared::new(&model)?;
+        let drift = drifts(&model);
         let relight = drift.iter().any(|&d| d > RELIGHT);
         let densities =
             |weights: &[f64]| prepared.nodes.iter().map(|n| n.densities(weights, &drift, calibration.noise)).collect();
@@ -111,10 +121,14 @@ impl<'a> Inspector<'a> {
         Some(Inspector { model, calibration, camera, search, prepared, densities, relight })
     }
 
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
     /// Judges one photo.
     pub fn inspect(&self, photo: &Photo) -> Verdict {
         let fields = self.search.fields(&photo.light, self.calibration.noise);
-        let located = self.search.locate(&fields, &self.camera, &widened(self.model));
+        let located = self.search.locate(&fields, &self.camera, &widened(&self.model));
         let least = self.least_score();
         match located {
             Some(found) if found.score >= least => self.judge(photo, found),
@@ -211,7 +225,8 @@ impl<'a> Inspector<'a> {
             against: against(evidence, self.coefficients(index)),
             best_fault: fault.map_or_else(String::new, |h| node.hypotheses[h].fault.clone()),
             inside: evidence.inside,
-            faulty: score < node.threshold,
+            // What is no number is no proof of anything.
+            faulty: score.is_nan() || score < node.threshold,
             explained: false,
         }
     }

@@ -17,6 +17,9 @@ const BEAM: usize = 12;
 /// A coarse step moves edge points by at most this many coarse px.
 const COARSE_STEP_PX: f64 = 1.0;
 
+/// Poses of the coarse grid at most, far above any real station: a model that asks for more gets wider steps.
+const MOST_POSES: f64 = 4e6;
+
 /// An edge point: position (mm, assembly frame) and a second point 1 mm along the edge.
 #[derive(Debug, Clone, Copy)]
 pub struct EdgePoint {
@@ -143,19 +146,24 @@ impl Search {
     /// Grid values along each axis, so fine that no edge point moves more than a coarse step.
     fn grid(&self, camera: &Camera, standing: &[[f64; 2]; 4]) -> [Vec<f64>; 4] {
         let home = Pose::from_array(standing.map(|[a, b]| (a + b) / 2.0));
-        let mut axes = [const { Vec::new() }; 4];
-        for (axis, values) in axes.iter_mut().enumerate() {
+        let mut counts = [0.0f64; 4];
+        for (axis, count) in counts.iter_mut().enumerate() {
             let [low, high] = standing[axis];
             let small = (high - low).max(1e-9) * 1e-3;
             let mut moved = home.to_array();
             moved[axis] += small;
             let speed = self.speed(camera, &home, &Pose::from_array(moved)) / small;
             let steps = ((high - low) * speed / COARSE_STEP_PX).ceil().clamp(0.0, 400.0);
-            let steps = if high - low < 1e-9 { 0.0 } else { steps.max(2.0) };
-            let at = |i: u32| if steps == 0.0 { low } else { low + (high - low) * f64::from(i) / steps };
-            values.extend((0..=steps as u32).map(at));
+            *count = if high - low < 1e-9 { 0.0 } else { steps.max(2.0) };
         }
-        axes
+        while counts.iter().map(|c| c + 1.0).product::<f64>() > MOST_POSES {
+            counts = counts.map(|c| if c > 2.0 { (c * 0.8).floor().max(2.0) } else { c });
+        }
+        [0, 1, 2, 3].map(|axis| {
+            let ([low, high], steps) = (standing[axis], counts[axis]);
+            let at = |i: u32| if steps == 0.0 { low } else { low + (high - low) * f64::from(i) / steps };
+            (0..=steps as u32).map(at).collect()
+        })
     }
 
     /// Root mean square motion of the coarse edge points between two poses (px).

@@ -5,6 +5,7 @@
 pub mod calibrate;
 pub mod camera;
 pub mod density;
+pub mod embed;
 pub mod field;
 mod follow;
 pub mod grid;
@@ -16,4 +17,5 @@ pub mod locate;
 pub mod model;
 pub mod photo;
 pub mod pose;
+pub mod report;
 pub mod window;

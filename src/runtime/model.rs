@@ -300,6 +300,7 @@ impl Node {
         let steps = self.steps.len() == lamps && self.steps.iter().all(|s| s.is_finite() && *s > 0.0);
         ensure(self.plane.is_finite() && steps, "node numbers out of range")?;
         ensure(self.spread.iter().all(|s| s.is_finite() && *s > 0.0), "node spread out of range")?;
+        ensure(!self.threshold.is_nan(), "node threshold out of range")?;
         ensure(self.parent.is_none_or(|p| (p as usize) < nodes), "node parent out of range")?;
         ensure(self.disturbs.iter().all(|&d| (d as usize) < nodes), "disturbed node out of range")?;
         ensure(self.mask.len() == height as usize, "mask rows")?;

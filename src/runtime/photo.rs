@@ -1,12 +1,12 @@
 //! Photos: a file's bytes become a linear grey image, or a clear error.
 //!
-//! In: bytes of a PNG, JPEG, BMP or TIFF file. Out: [`Photo`], linear in light, 1.0 at full scale. Never touches the file system.
+//! In: bytes of a PNG, JPEG, BMP or TIFF file, or pixels in memory. Out: [`Photo`], linear in light, 1.0 at full scale. Never touches the file system.
 
 use super::grid::Grid;
-use image::{ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use std::io::Cursor;
+use std::io::{self, Cursor};
 
 /// No photo of a station is larger than this many pixels on a side.
 const LARGEST_SIDE: u32 = 20_000;
@@ -52,30 +52,188 @@ impl fmt::Display for PhotoError {
 impl std::error::Error for PhotoError {}
 
 impl Photo {
-    /// Decodes the bytes of an image file; colour becomes luminance (ITU-R BT.709) after linearisation.
+    /// Decodes the bytes of an image file of 8 or 16 bits; colour becomes luminance (ITU-R BT.709) after linearisation, and
+    /// alpha is passed over. The size is compared before anything is allocated for the pixels.
     pub fn decode(bytes: &[u8], tone: Tone, size: [u32; 2]) -> Result<Photo, PhotoError> {
-        let unreadable = |e: &dyn fmt::Display| PhotoError::Unreadable(e.to_string());
-        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| unreadable(&e))?;
-        let mut limits = Limits::default();
-        limits.max_image_width = Some(LARGEST_SIDE);
-        limits.max_image_height = Some(LARGEST_SIDE);
-        limits.max_alloc = Some(LARGEST_DECODE);
-        reader.limits(limits);
-        let decoded = reader.decode().map_err(|e| unreadable(&e))?;
-        let is = [decoded.width(), decoded.height()];
+        let unreadable = |e: ImageError| PhotoError::Unreadable(plain(&e));
+        let mut limits = limits();
+        let mut reader = ImageReader::new(Cursor::new(bytes));
+        reader.limits(limits.clone());
+        let reader = reader.with_guessed_format().map_err(|e| PhotoError::Unreadable(e.to_string()))?;
+        if reader.format() == Some(ImageFormat::Jpeg) && !is_whole_jpeg(bytes) {
+            return Err(PhotoError::Unreadable(CUT_SHORT.into()));
+        }
+        let mut decoder = reader.into_decoder().map_err(unreadable)?;
+        let is = decoder.dimensions().into();
         if is != size {
             return Err(PhotoError::WrongSize(is, size));
         }
-        let rgb = decoded.into_rgb32f();
-        let linear = |v: f32| if tone == Tone::Srgb { srgb_to_linear(v) } else { v };
-        let values =
-            rgb.pixels().map(|p| 0.2126 * linear(p[0]) + 0.7152 * linear(p[1]) + 0.0722 * linear(p[2])).collect();
-        Ok(Photo { light: Grid::new(is[0] as usize, is[1] as usize, values) })
+        limits.reserve(decoder.total_bytes()).map_err(unreadable)?;
+        decoder.set_limits(limits).map_err(unreadable)?;
+        let decoded = DynamicImage::from_decoder(decoder).map_err(unreadable)?;
+        let light = light(&decoded, tone).ok_or_else(|| {
+            PhotoError::Unreadable("its pixels are floating-point numbers: 8 or 16 bits are expected".into())
+        })?;
+        Ok(Photo { light: Grid::new(is[0] as usize, is[1] as usize, light) })
+    }
+
+    /// A photo from pixels in memory, as a camera's driver gives them.
+    pub fn from_pixels(pixels: &Pixels, tone: Tone, size: [u32; 2]) -> Result<Photo, PhotoError> {
+        if pixels.size != size {
+            return Err(PhotoError::WrongSize(pixels.size, size));
+        }
+        let [width, height] = size.map(|s| s as usize);
+        let row = width * pixels.format.bytes();
+        // Sizes are a model's: no product here comes near the end of usize, but for the stride.
+        let needed = pixels.stride.checked_mul(height.saturating_sub(1)).and_then(|n| n.checked_add(row));
+        if pixels.stride < row || needed.is_none_or(|needed| pixels.bytes.len() < needed) {
+            let (stride, given) = (pixels.stride, pixels.bytes.len());
+            return Err(PhotoError::Unreadable(format!(
+                "{given} bytes in rows of {stride} are too few for {height} rows of {row} bytes"
+            )));
+        }
+        let rows = (0..height).map(|y| &pixels.bytes[y * pixels.stride..][..row]);
+        let curve = Curve::new(tone, pixels.format.deepest());
+        let mut values = Vec::with_capacity(width * height);
+        for row in rows {
+            match pixels.format {
+                PixelFormat::Grey8 => values.extend(row.iter().map(|&v| curve.at(v))),
+                PixelFormat::Grey16 => {
+                    values.extend(row.chunks_exact(2).map(|p| curve.at(u16::from_ne_bytes([p[0], p[1]]))));
+                }
+                PixelFormat::Rgb8 => values.extend(row.chunks_exact(3).map(|p| curve.luminance(p[0], p[1], p[2]))),
+                PixelFormat::Bgr8 => values.extend(row.chunks_exact(3).map(|p| curve.luminance(p[2], p[1], p[0]))),
+                PixelFormat::Rgba8 => values.extend(row.chunks_exact(4).map(|p| curve.luminance(p[0], p[1], p[2]))),
+            }
+        }
+        Ok(Photo { light: Grid::new(width, height, values) })
     }
 
     /// A photo from linear values, row by row.
     pub fn from_light(light: Grid) -> Photo {
         Photo { light }
+    }
+}
+
+/// How pixels lie in memory. Full scale is 255, or 65535 in the machine's byte order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PixelFormat {
+    Grey8,
+    Grey16,
+    Rgb8,
+    Bgr8,
+    Rgba8,
+}
+
+impl PixelFormat {
+    /// Bytes of a pixel.
+    pub fn bytes(self) -> usize {
+        match self {
+            PixelFormat::Grey8 => 1,
+            PixelFormat::Grey16 => 2,
+            PixelFormat::Rgb8 | PixelFormat::Bgr8 => 3,
+            PixelFormat::Rgba8 => 4,
+        }
+    }
+
+    /// The largest value.
+    fn deepest(self) -> u16 {
+        if self == PixelFormat::Grey16 { u16::MAX } else { 255 }
+    }
+}
+
+/// Pixels in memory, top row first.
+#[derive(Debug, Clone, Copy)]
+pub struct Pixels<'a> {
+    pub bytes: &'a [u8],
+    pub format: PixelFormat,
+    /// Width and height in px.
+    pub size: [u32; 2],
+    /// Bytes from one row to the next.
+    pub stride: usize,
+}
+
+/// What decoding may use.
+fn limits() -> Limits {
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(LARGEST_SIDE);
+    limits.max_image_height = Some(LARGEST_SIDE);
+    limits.max_alloc = Some(LARGEST_DECODE);
+    limits
+}
+
+const CUT_SHORT: &str = "the file is cut short";
+
+/// Whether a JPEG file goes on to its end marker (ITU-T T.81, annex B). The decoder paints what is missing grey, and the inspector
+/// would judge that.
+fn is_whole_jpeg(bytes: &[u8]) -> bool {
+    const END: u8 = 0xd9;
+    let mut at = 0;
+    while let Some(found) = bytes.get(at..).and_then(|rest| rest.iter().position(|&b| b == 0xff)) {
+        at += found + 1;
+        match bytes.get(at) {
+            Some(&END) => return true,
+            // Stuffed zeros and restarts within a scan, start of image, a marker without a segment, padding.
+            Some(0x00 | 0x01 | 0xd0..=0xd8) => at += 1,
+            Some(0xff) => {}
+            // Segments are stepped over: what they hold, a preview with an end of its own, may look like markers.
+            Some(_) => match bytes.get(at + 1..at + 3) {
+                Some(&[high, low]) => at += 1 + usize::from(u16::from_be_bytes([high, low])),
+                _ => return false,
+            },
+            None => return false,
+        }
+    }
+    false
+}
+
+/// What is wrong with a file, for people.
+fn plain(error: &ImageError) -> String {
+    match error {
+        ImageError::Unsupported(_) => format!("{error}; PNG, JPEG, TIFF and BMP are read"),
+        ImageError::Limits(_) => format!("{error}: it would need more memory than any photo of a station"),
+        ImageError::IoError(e) if e.kind() == io::ErrorKind::UnexpectedEof => CUT_SHORT.into(),
+        _ => error.to_string(),
+    }
+}
+
+/// Linear values of a decoded image; `None` for pixels that are no integers.
+fn light(image: &DynamicImage, tone: Tone) -> Option<Vec<f32>> {
+    let (narrow, wide) = (|| Curve::new(tone, 255), || Curve::new(tone, u16::MAX));
+    fn grey<P: Copy + Into<u16>>(samples: &[P], step: usize, curve: Curve) -> Vec<f32> {
+        samples.chunks_exact(step).map(|p| curve.at(p[0])).collect()
+    }
+    fn colour<P: Copy + Into<u16>>(samples: &[P], step: usize, curve: Curve) -> Vec<f32> {
+        samples.chunks_exact(step).map(|p| curve.luminance(p[0], p[1], p[2])).collect()
+    }
+    Some(match image {
+        DynamicImage::ImageLuma8(i) => grey(i.as_raw(), 1, narrow()),
+        DynamicImage::ImageLumaA8(i) => grey(i.as_raw(), 2, narrow()),
+        DynamicImage::ImageRgb8(i) => colour(i.as_raw(), 3, narrow()),
+        DynamicImage::ImageRgba8(i) => colour(i.as_raw(), 4, narrow()),
+        DynamicImage::ImageLuma16(i) => grey(i.as_raw(), 1, wide()),
+        DynamicImage::ImageLumaA16(i) => grey(i.as_raw(), 2, wide()),
+        DynamicImage::ImageRgb16(i) => colour(i.as_raw(), 3, wide()),
+        DynamicImage::ImageRgba16(i) => colour(i.as_raw(), 4, wide()),
+        _ => return None,
+    })
+}
+
+/// Light by grey value: a table, so that no pixel costs a power.
+struct Curve(Vec<f32>);
+
+impl Curve {
+    fn new(tone: Tone, deepest: u16) -> Curve {
+        let linear = |v: f32| if tone == Tone::Srgb { srgb_to_linear(v) } else { v };
+        Curve((0..=deepest).map(|v| linear(f32::from(v) / f32::from(deepest))).collect())
+    }
+
+    fn at(&self, value: impl Into<u16>) -> f32 {
+        self.0[usize::from(value.into())]
+    }
+
+    fn luminance<P: Into<u16>>(&self, red: P, green: P, blue: P) -> f32 {
+        0.2126 * self.at(red) + 0.7152 * self.at(green) + 0.0722 * self.at(blue)
     }
 }
 

@@ -1,0 +1,193 @@
+//! A verdict as one line of JSON: the same on the command line, behind the C interface and in a browser.
+//!
+//! In: the name of a photo and what came of it. Out: text. The keys and their order are a contract; scripts depend on them.
+//! Written by hand because the runtime has no JSON crate; the tests hold it against one.
+
+use super::inspect::{Decision, Finding, Verdict};
+use std::fmt::Write;
+
+/// What came of one photo.
+pub struct Outcome {
+    pub photo: String,
+    pub verdict: Verdict,
+    /// Time of judging, the model being loaded; `None` where nobody looked at a clock.
+    pub milliseconds: Option<f64>,
+}
+
+impl Outcome {
+    /// A photo that never reached the inspector.
+    pub fn unreadable(photo: String, reason: String) -> Outcome {
+        let verdict = Verdict {
+            decision: Decision::CannotInspect,
+            reason,
+            pose: None,
+            scale: 1.0,
+            locator_score: 0.0,
+            findings: Vec::new(),
+            nodes: Vec::new(),
+            outline: None,
+        };
+        Outcome { photo, verdict, milliseconds: Some(0.0) }
+    }
+
+    /// One JSON object, without the line break.
+    pub fn json(&self) -> String {
+        let verdict = &self.verdict;
+        let mut text = String::from("{\"photo\":");
+        string(&mut text, &self.photo);
+        text += ",\"verdict\":";
+        string(&mut text, word(verdict.decision));
+        text += ",\"reason\":";
+        string(&mut text, &verdict.reason);
+        text += ",\"pose\":";
+        match &verdict.pose {
+            // mm and degrees; size relative to the nominal photo.
+            Some(pose) => {
+                let numbers = [
+                    ("{\"x\":", pose.x, 4),
+                    (",\"y\":", pose.y, 4),
+                    (",\"scale\":", verdict.scale, 5),
+                    (",\"rotation_deg\":", pose.rz.to_degrees(), 4),
+                ];
+                for (key, value, decimals) in numbers {
+                    text += key;
+                    number(&mut text, value, decimals);
+                }
+                text += "}";
+            }
+            None => text += "null",
+        }
+        text += ",\"findings\":[";
+        for (i, found) in verdict.findings.iter().enumerate() {
+            text += if i > 0 { "," } else { "" };
+            finding(&mut text, found);
+        }
+        text += "],\"milliseconds\":";
+        match self.milliseconds {
+            Some(milliseconds) => number(&mut text, milliseconds, 3),
+            None => text += "null",
+        }
+        text + "}"
+    }
+}
+
+/// The word in reports.
+pub fn word(decision: Decision) -> &'static str {
+    match decision {
+        Decision::Go => "go",
+        Decision::NoGo => "no-go",
+        Decision::CannotInspect => "cannot-inspect",
+    }
+}
+
+fn finding(text: &mut String, finding: &Finding) {
+    let names = [
+        ("{\"component\":", &finding.component),
+        (",\"fault\":", &finding.fault),
+        (",\"error_tree\":", &finding.error_tree),
+        (",\"node\":", &finding.node),
+    ];
+    for (key, name) in names {
+        *text += key;
+        string(text, name);
+    }
+    *text += ",\"p_value\":";
+    number(text, finding.p_value, 6);
+    *text += ",\"box\":[";
+    for (i, side) in finding.box_px.into_iter().enumerate() {
+        *text += if i > 0 { "," } else { "" };
+        number(text, side, 1);
+    }
+    *text += "]}";
+}
+
+/// A number with at most `decimals` decimals; what is no number is null.
+fn number(text: &mut String, value: f64, decimals: i32) {
+    let scale = 10f64.powi(decimals);
+    // Adding zero turns -0.0 into 0.0.
+    let rounded = (value * scale).round() / scale + 0.0;
+    // Writing to a string cannot fail.
+    let _ = if rounded.is_finite() { write!(text, "{rounded:?}") } else { write!(text, "null") };
+}
+
+/// A string in quotation marks (RFC 8259, section 7).
+fn string(text: &mut String, value: &str) {
+    text.push('"');
+    for c in value.chars() {
+        match c {
+            '"' => *text += "\\\"",
+            '\\' => *text += "\\\\",
+            '\n' => *text += "\\n",
+            '\r' => *text += "\\r",
+            '\t' => *text += "\\t",
+            c if c < ' ' => {
+                let _ = write!(text, "\\u{:04x}", u32::from(c));
+            }
+            c => text.push(c),
+        }
+    }
+    text.push('"');
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::pose::Pose;
+    use super::*;
+
+    fn faulty() -> Outcome {
+        let finding = Finding {
+            component: "pin[2]".into(),
+            fault: "missing".into(),
+            error_tree: "pin[2]".into(),
+            node: "pin[2]".into(),
+            p_value: 0.0004,
+            box_px: [1.0, 2.0, 3.25, 4.0],
+        };
+        let mut outcome = Outcome::unreadable("a \"b\".png".into(), "pin[2]: missing".into());
+        outcome.verdict.decision = Decision::NoGo;
+        outcome.verdict.pose = Some(Pose { x: 1.0, y: -2.0, z: 0.0, rz: 0.1 });
+        outcome.verdict.findings.push(finding);
+        outcome.milliseconds = Some(12.3);
+        outcome
+    }
+
+    #[test]
+    fn the_json_line_keeps_its_keys_in_order() {
+        let expected = concat!(
+            r#"{"photo":"a \"b\".png","verdict":"no-go","reason":"pin[2]: missing","#,
+            r#""pose":{"x":1.0,"y":-2.0,"scale":1.0,"rotation_deg":5.7296},"#,
+            r#""findings":[{"component":"pin[2]","fault":"missing","error_tree":"pin[2]","node":"pin[2]","#,
+            r#""p_value":0.0004,"box":[1.0,2.0,3.3,4.0]}],"milliseconds":12.3}"#
+        );
+        assert_eq!(faulty().json(), expected);
+    }
+
+    #[test]
+    fn a_photo_that_cannot_be_read_has_all_keys_too() {
+        let line = Outcome::unreadable("x.png".into(), "no".into()).json();
+        let expected = r#"{"photo":"x.png","verdict":"cannot-inspect","reason":"no","pose":null,"findings":[],"milliseconds":0.0}"#;
+        assert_eq!(line, expected);
+    }
+
+    #[test]
+    fn without_a_clock_the_time_is_null() {
+        let outcome = Outcome { milliseconds: None, ..Outcome::unreadable(String::new(), String::new()) };
+        assert!(outcome.json().ends_with(r#""milliseconds":null}"#));
+    }
+
+    #[test]
+    fn strings_and_numbers_are_those_of_a_json_crate() {
+        for value in ["", "a\"b\\c/", "\u{0}\u{1f}\u{7f}\n\r\t", "µm 🔩"] {
+            let mut text = String::new();
+            string(&mut text, value);
+            assert_eq!(serde_json::from_str::<String>(&text).unwrap(), value);
+        }
+        for value in [0.0, -0.0, 1.0, -1.5, 1e-6, 123456.7, 1e17, 1e300, f64::MAX, f64::NAN, f64::INFINITY] {
+            let mut text = String::new();
+            number(&mut text, value, 6);
+            let read: serde_json::Value = serde_json::from_str(&text).unwrap();
+            let expected = (value * 1e6).is_finite().then_some(value + 0.0);
+            assert_eq!(read.as_f64(), expected, "{text}");
+        }
+    }
+}
