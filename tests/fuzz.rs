@@ -214,6 +214,16 @@ fn fuzz(name: &str, rounds: u64, target: fn(&[u8]), damaged: impl Fn(&mut Draw) 
     assert!(memory < MOST_MEMORY_KB, "{memory} kB");
 }
 
+/// What a fuzzer begins with, for those who ask: see `fuzz/README.md`.
+fn seeds(name: &str, files: &[&[u8]]) {
+    let Some(corpus) = std::env::var_os("GONOGO_FUZZ_CORPUS") else { return };
+    let folder = Path::new(&corpus).join(name);
+    fs::create_dir_all(&folder).unwrap();
+    for (i, file) in files.iter().enumerate() {
+        fs::write(folder.join(i.to_string()), file).unwrap();
+    }
+}
+
 /// The most memory this process has had, where the system tells.
 fn peak_memory_kb() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -230,6 +240,7 @@ fn models() {
     let text = targets::tiny().write();
     let body = targets::unsealed(&text).to_string();
     targets::model(body.as_bytes());
+    seeds("model", &[body.as_bytes()]);
     fuzz("model", 3_000, targets::model, |draw| text_damaged(&body, &[&body], draw).into_bytes());
 }
 
@@ -241,6 +252,7 @@ fn calibrations() {
     let text = calibration.write();
     let body = targets::unsealed(&text).to_string();
     targets::calibration(body.as_bytes());
+    seeds("calibration", &[body.as_bytes()]);
     fuzz("calibration", 3_000, targets::calibration, |draw| text_damaged(&body, &[&body], draw).into_bytes());
 }
 
@@ -264,6 +276,7 @@ fn photos() {
     }
     files.iter().for_each(|file| targets::photo(file));
     let files: Vec<&[u8]> = files.iter().map(Vec::as_slice).collect();
+    seeds("photo", &files);
     fuzz("photo", 4_000, targets::photo, |draw| {
         let file = draw.one(&files);
         bytes_damaged(file, draw)

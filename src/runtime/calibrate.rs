@@ -114,7 +114,12 @@ impl Calibration {
         }
         let finite = calibration.lamps.iter().chain(&calibration.installation.to_array()).all(|v| v.is_finite());
         let lamps = calibration.lamps.len() == model.station.lamps.len();
-        if !finite || !lamps || calibration.noise.is_nan() || calibration.noise <= 0.0 {
+        if !finite
+            || !calibration.installation.is_likely()
+            || !lamps
+            || calibration.noise.is_nan()
+            || calibration.noise <= 0.0
+        {
             return Err(malformed("the calibration's numbers are out of range"));
         }
         Ok(calibration)

@@ -18,7 +18,7 @@ const BEAM: usize = 12;
 const COARSE_STEP_PX: f64 = 1.0;
 
 /// Poses of the coarse grid at most, far above any real station: a model that asks for more gets wider steps.
-const MOST_POSES: f64 = 4e6;
+const MOST_POSES: f64 = 1e6;
 
 /// An edge point: position (mm, assembly frame) and a second point 1 mm along the edge.
 #[derive(Debug, Clone, Copy)]

@@ -81,6 +81,12 @@ impl Installation {
         Camera { position, axes, focal: camera.focal * (1.0 + self.focal), k1: camera.k1 + self.k1, ..*camera }
     }
 
+    /// Whether a camera could hang like this; what is read from a file may be anything.
+    pub fn is_likely(&self) -> bool {
+        let within = |values: &[f64], most: f64| values.iter().all(|v| v.abs() <= most);
+        within(&self.offset, 1e4) && within(&self.turn, 1.0) && within(&[self.focal], 0.5) && within(&[self.k1], 10.0)
+    }
+
     /// Standard deviations of the numbers of [`Installation::to_array`] for uniform errors within the stated half-widths.
     pub fn spread(install: &Install) -> [f64; 8] {
         let uniform = |half: f64| half.max(1e-9) / 3f64.sqrt();
