@@ -8,7 +8,7 @@ const SIZE: [u32; 2] = [45, 31];
 
 /// 16-bit grey values with edges and a ramp.
 fn scene() -> DynamicImage {
-    let value = |x: u32, y: u32| if (x / 9 + y / 7) % 2 == 0 { 6_000 + 900 * x } else { 61_000 - 1_100 * y };
+    let value = |x: u32, y: u32| if (x / 9 + y / 7).is_multiple_of(2) { 6_000 + 900 * x } else { 61_000 - 1_100 * y };
     image::ImageBuffer::from_fn(SIZE[0], SIZE[1], |x, y| Luma([value(x, y) as u16])).into()
 }
 

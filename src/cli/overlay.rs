@@ -6,7 +6,7 @@
 
 use super::font;
 use crate::runtime::inspect::{Decision, NodeReport, Verdict};
-use image::{ImageFormat, Rgb, RgbImage};
+use image::{DynamicImage, ImageError, ImageFormat, ImageReader, Limits, Rgb, RgbImage};
 use std::io::Cursor;
 
 type Point = [f64; 2];
@@ -23,12 +23,22 @@ const DOT: u32 = 2;
 
 /// The overlay as a PNG file; the reason why not, for photos that cannot be decoded.
 pub fn png(photo: &[u8], verdict: &Verdict) -> Result<Vec<u8>, String> {
-    let grey = image::load_from_memory(photo).map_err(|e| e.to_string())?.into_luma8();
+    let grey = decoded(photo).map_err(|e| e.to_string())?.into_luma8();
     let mut picture = RgbImage::from_fn(grey.width(), grey.height(), |x, y| Rgb([grey.get_pixel(x, y).0[0]; 3]));
     draw(&mut picture, verdict);
     let mut bytes = Vec::new();
     picture.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).map_err(|e| e.to_string())?;
     Ok(bytes)
+}
+
+/// The photo may be anything: it was not said that it could be judged.
+fn decoded(photo: &[u8]) -> Result<DynamicImage, ImageError> {
+    const LARGEST: u64 = 256 << 20;
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(LARGEST);
+    let mut reader = ImageReader::new(Cursor::new(photo)).with_guessed_format()?;
+    reader.limits(limits);
+    reader.decode()
 }
 
 fn draw(picture: &mut RgbImage, verdict: &Verdict) {
