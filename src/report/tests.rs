@@ -3,9 +3,11 @@
 use super::*;
 use crate::assembly::error_tree::object_tree;
 use crate::assembly::{analyse, sample};
+use crate::design::model::{Material, MaterialKind};
 use crate::diag::Span;
 use crate::runtime::inspect::{Decision, Finding, NodeReport};
 use crate::runtime::pose::Pose;
+use crate::units::Range;
 
 /// What a spiteful name looks like.
 const SPITE: &str = "</script><img src=x onerror=alert(1)>\"'&";
@@ -22,11 +24,29 @@ fn bench(rename: impl Fn(&mut Design)) -> Bench {
     let mut assembly = sample::pattern_wheel();
     let analysis = analyse(&assembly.design, &assembly.solids).0;
     let trees = object_tree(&assembly.design, &analysis.liaison).trees;
+    assembly.design.materials = vec![steel()];
+    assembly.design.parts.iter_mut().for_each(|p| p.material = 0);
     rename(&mut assembly.design);
     let sources = Sources { files: vec![(format!("{SPITE}.gng"), format!("let a = 6 {SPITE}\nlet b = 7\n"))] };
     let span = Span { file: 0, start: 4, end: 5 };
     let doubt = Diagnostic::warning("W0502", span, format!("{SPITE} can meet")).label(SPITE).note(SPITE).help(SPITE);
     Bench { assembly, analysis, trees, diagnostics: vec![doubt], sources }
+}
+
+fn steel() -> Material {
+    let exactly = |v: f64| Range { low: v, nominal: v, high: v };
+    Material {
+        name: "steel".into(),
+        kind: MaterialKind::Metal,
+        n: 2.4,
+        k: 4.1,
+        reflectance: exactly(1.0),
+        roughness: exactly(0.2),
+        edge_break: exactly(0.1),
+        mottle: 0.0,
+        mottle_size: [1.0; 3],
+        span: Span::default(),
+    }
 }
 
 fn verdict() -> Verdict {
