@@ -11,6 +11,7 @@ pub mod grid;
 mod haar;
 pub mod inspect;
 pub mod judge;
+pub mod light;
 pub mod linear;
 pub mod locate;
 pub mod model;

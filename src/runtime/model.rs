@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The format this version writes, and the only one it reads so far.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 /// Larger files are refused before they are parsed (bytes).
 const LARGEST_FILE: usize = 128 << 20;
 /// Caps on counts, far above any real station.
@@ -171,6 +171,18 @@ pub struct Node {
     pub fault_scores: Vec<f64>,
     /// The first is the good state.
     pub hypotheses: Vec<Hypothesis>,
+    /// What the good state looks like beside the faults of other components.
+    pub disturbed: Vec<Disturbed>,
+}
+
+/// The good state of a component while another is faulty.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Disturbed {
+    /// The node of the faulty component.
+    pub by: u32,
+    /// Its fault and how this node looks then.
+    pub state: Hypothesis,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -309,7 +321,10 @@ impl Node {
             ensure(runs, "mask runs")?;
         }
         ensure(!self.hypotheses.is_empty() && self.hypotheses.len() <= 64, "number of hypotheses")?;
-        self.hypotheses.iter().try_for_each(|h| h.check(lamps, width as usize, height as usize))
+        ensure(self.disturbed.len() <= 256, "number of disturbances")?;
+        ensure(self.disturbed.iter().all(|d| (d.by as usize) < nodes), "disturbing node out of range")?;
+        let states = self.disturbed.iter().map(|d| &d.state);
+        self.hypotheses.iter().chain(states).try_for_each(|h| h.check(lamps, width as usize, height as usize))
     }
 }
 
