@@ -7,10 +7,10 @@
 use super::calibrate::{Calibration, widened};
 use super::camera::Camera;
 use super::density::Density;
-use super::judge::{Evidence, Prepared, Pyramid};
+use super::judge::{Evidence, NodeImages, Prepared, Pyramid};
 use super::light::Light;
 use super::locate::{Located, Search};
-use super::model::{Lamp, Model, Node};
+use super::model::{Model, Node};
 use super::photo::Photo;
 use super::pose::Pose;
 use serde::{Deserialize, Serialize};
@@ -99,7 +99,9 @@ impl<'a> Inspector<'a> {
     pub fn new(model: &'a Model, calibration: &'a Calibration) -> Option<Inspector<'a>> {
         let prepared = Prepared::new(model)?;
         let light = light(model, &calibration.lamps);
-        let densities = prepared.nodes.iter().map(|n| n.densities(&light, calibration.noise)).collect();
+        let references = |node: usize| calibration.references.iter().map(|r| r.window(node)).collect::<Vec<_>>();
+        let densities = |(i, n): (usize, &NodeImages)| n.densities(&light, calibration.noise, &references(i));
+        let densities = prepared.nodes.iter().enumerate().map(densities).collect();
         let camera = calibration.installation.apply(&model.station.camera);
         let search = Search::new(&model.locator);
         Some(Inspector { model, calibration, camera, search, prepared, light, densities })
@@ -242,7 +244,7 @@ impl<'a> Inspector<'a> {
             return true;
         }
         let states = self.model.nodes[node].disturbed.iter().zip(disturbed);
-        let beside = states.filter(|(d, _)| d.by as usize == blamed && d.state.fault == fault).map(|(_, l)| *l);
+        let beside = states.filter(|(d, _)| d.by as usize == blamed && d.fault == fault).map(|(_, l)| *l);
         let own = evidence.log_likelihoods[1..].iter().copied().fold(f64::NEG_INFINITY, f64::max);
         beside.fold(f64::NEG_INFINITY, f64::max) > own
     }
@@ -296,9 +298,7 @@ impl<'a> Inspector<'a> {
 
 /// The light of a station whose lamps were calibrated to these weights.
 pub fn light(model: &Model, weights: &[f64]) -> Light {
-    let lamps = &model.station.lamps;
-    let [powers, drift] = [|l: &Lamp| l.power, |l: &Lamp| l.drift].map(|of| lamps.iter().map(of).collect::<Vec<_>>());
-    Light::new(weights, &powers, &drift)
+    Light::new(weights, &model.station.lamps)
 }
 
 /// The error mode that fits best and the log-likelihood ratio per coefficient of the good state against it.

@@ -6,7 +6,7 @@ use super::camera::Camera;
 use super::density::{Density, Floor, mean_of};
 use super::grid::Grid;
 use super::light::{Light, LightEvidence};
-use super::model::{Hypothesis, Image, Model, Node};
+use super::model::{Image, Model, Node};
 use super::pose::Pose;
 use super::window::{Frame, Placed, Stencil, Window, mask_of};
 
@@ -18,8 +18,6 @@ const LARGEST_REACH: f64 = 12.0;
 const SHORT_LIST: usize = 4;
 /// Photo values from here on count as clipped.
 pub const CLIP: f32 = 0.98;
-/// Resolution levels per node.
-pub const LEVELS: u32 = 4;
 
 /// A node's geometry and training images, independent of the light.
 pub struct NodeImages {
@@ -40,17 +38,18 @@ impl NodeImages {
     pub fn new(node: &Node, nominal: &Camera, home: &Pose, lamps: usize) -> Option<NodeImages> {
         let grid = |image: &Image| {
             let step = node.steps[image.lamp as usize] as f32;
-            let values = image.rows.iter().flatten().map(|&v| f32::from(v) * step).collect();
+            let values = image.rows.iter().flat_map(|row| &row.0).map(|&v| f32::from(v) * step).collect();
             Grid::new(node.size[0] as usize, node.size[1] as usize, values)
         };
         let mask = mask_of(node);
-        let draws = |h: &Hypothesis| h.images.chunks(lamps).map(|draw| draw.iter().map(grid).collect()).collect();
+        let draws = |images: &Vec<Image>| images.chunks(lamps).map(|draw| draw.iter().map(grid).collect()).collect();
+        let own = node.hypotheses.iter().map(|h| &h.images);
         Some(NodeImages {
             window: Window::new(Frame::of(node), nominal, home)?,
-            stencil: Stencil::new(&mask, LEVELS),
+            stencil: Stencil::new(&mask, node.levels),
             surroundings: surroundings(&mask),
             spread: node.spread.map(|s| s / f64::from(node.factor)),
-            hypotheses: node.hypotheses.iter().chain(node.disturbed.iter().map(|d| &d.state)).map(draws).collect(),
+            hypotheses: own.chain(node.disturbed.iter().map(|d| &d.images)).map(draws).collect(),
             own: node.hypotheses.len(),
         })
     }
@@ -80,7 +79,22 @@ impl NodeImages {
     }
 
     /// The densities of all hypotheses and then of all disturbed states under the given light.
-    pub fn densities(&self, light: &Light, noise: f64) -> Vec<Density> {
+    ///
+    /// `references` are windows of correct assemblies as [`NodeImages::reference`] cuts them: what they have in common with
+    /// no render is expected of every photo of the station, wherever a hypothesis looks like the good state.
+    pub fn densities(&self, light: &Light, noise: f64, references: &[Grid]) -> Vec<Density> {
+        let mut densities = self.rendered(light, noise);
+        let level = |window: &Grid| self.stencil.coefficients(&light.level(window.clone(), &self.surroundings));
+        let gaps: Vec<Vec<f32>> = references.iter().map(|window| densities[0].gap(&level(window))).collect();
+        if !gaps.is_empty() {
+            let shares: Vec<Vec<f32>> = densities.iter().map(|d| d.shared(&densities[0])).collect();
+            densities.iter_mut().zip(&shares).for_each(|(d, share)| d.adapt(&gaps, share));
+        }
+        densities
+    }
+
+    /// The densities as renders alone make them.
+    fn rendered(&self, light: &Light, noise: f64) -> Vec<Density> {
         let noise = noise / f64::from(self.window.frame.factor);
         let good = self.lit(0, light);
         let floor = Floor::new(&self.stencil.levels, noise, &mean_of(&good));
@@ -91,13 +105,18 @@ impl NodeImages {
         (0..self.hypotheses.len()).map(density).collect()
     }
 
-    /// A lamp that drifts by ± d (uniform) moves the image by its own share times d / √3.
+    /// What a drift of the light does to a hypothesis, one column per drift: images are linear in light.
     fn lamp_columns(&self, hypothesis: usize, light: &Light) -> Vec<Vec<f32>> {
-        let Light::Steady { weights, drift } = light else { return Vec::new() };
+        let Light::Steady { drifts, .. } = light else { return Vec::new() };
         let means = self.lamp_means(hypothesis);
-        let scales = weights.iter().zip(drift).map(|(w, d)| (w * d / 3f64.sqrt()) as f32);
-        let columns = means.into_iter().zip(scales).filter(|(_, s)| *s > 0.0);
-        columns.map(|(mean, s)| mean.into_iter().map(|v| v * s).collect()).collect()
+        let column = |drift: &Vec<f64>| {
+            let mut sum = vec![0.0f32; means[0].len()];
+            for (mean, &scale) in means.iter().zip(drift) {
+                sum.iter_mut().zip(mean).for_each(|(s, v)| *s += v * scale as f32);
+            }
+            sum
+        };
+        drifts.iter().map(column).collect()
     }
 }
 
@@ -210,6 +229,13 @@ impl NodeImages {
             }
         }
         out
+    }
+
+    /// The node's window in a photo of a correct assembly, at its most likely shift.
+    pub fn reference(&self, light: &Light, noise: f64, reduced: &Grid, camera: &Camera, pose: &Pose) -> Grid {
+        let good = &self.rendered(light, noise)[0];
+        let shift = self.best_shift(good, light, reduced, camera, pose);
+        self.window.cut(reduced, &self.window.place(camera, pose), shift).0
     }
 
     /// The node's coefficients at a pose, and which of them touch clipped pixels.

@@ -6,6 +6,7 @@
 
 use super::grid::Grid;
 use super::linear;
+use super::model::Lamp;
 
 /// Lamps whose power drifts by more than this share are left open.
 const STEADY: f64 = 0.3;
@@ -21,24 +22,25 @@ const DIMMEST: f64 = 1e-3;
 /// The light under which densities are made.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Light {
-    /// Weights per lamp, and by which share they drift.
-    Steady { weights: Vec<f64>, drift: Vec<f64> },
+    /// Weights per lamp, and the drifts: what varies together, as a change of the weights (standard deviation).
+    Steady { weights: Vec<f64>, drifts: Vec<Vec<f64>> },
     /// Least and largest weight per lamp; every mix is as likely (log-uniform), and so is every exposure.
     Open { ranges: Vec<[f64; 2]> },
 }
 
 impl Light {
-    /// From the calibrated weights, the described powers and the drift of every lamp.
-    pub fn new(weights: &[f64], powers: &[f64], drift: &[f64]) -> Light {
-        if drift.iter().all(|&d| d <= STEADY) {
-            return Light::Steady { weights: weights.to_vec(), drift: drift.to_vec() };
+    /// From the calibrated weight of every lamp.
+    pub fn new(weights: &[f64], lamps: &[Lamp]) -> Light {
+        if lamps.iter().all(|l| l.drift <= STEADY) {
+            return Light::Steady { weights: weights.to_vec(), drifts: drifts(weights, lamps) };
         }
-        let total = |v: &[f64]| v.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let scale = total(weights) / total(powers);
+        let total = |sum: f64| sum.max(f64::MIN_POSITIVE);
+        let scale = total(weights.iter().sum()) / total(lamps.iter().map(|l| l.power).sum());
         // What an open lamp gave in one photo is no centre for the next.
-        let middle = |i: usize| if drift[i] <= STEADY { weights[i] } else { powers[i] * scale };
-        let range = |i: usize| range(middle(i), drift[i]);
-        Light::Open { ranges: (0..weights.len()).map(range).collect() }
+        let range = |(&weight, lamp): (&f64, &Lamp)| {
+            range(if lamp.drift <= STEADY { weight } else { lamp.power * scale }, lamp.drift)
+        };
+        Light::Open { ranges: weights.iter().zip(lamps).map(range).collect() }
     }
 
     pub fn is_open(&self) -> bool {
@@ -67,6 +69,16 @@ impl Light {
     pub fn level(&self, window: Grid, surroundings: &[bool]) -> Grid {
         if self.is_open() { levelled(window, surroundings, SURROUNDINGS) } else { window }
     }
+}
+
+/// One drift per light of the station: the patches of a room rise and fall together. Uniform within ± d is d / √3.
+fn drifts(weights: &[f64], lamps: &[Lamp]) -> Vec<Vec<f64>> {
+    let lights = lamps.iter().map(|l| l.light).max().map_or(0, |last| last + 1);
+    let of = |light: u32| -> Vec<f64> {
+        let own = |(w, lamp): (&f64, &Lamp)| if lamp.light == light { w * lamp.drift / 3f64.sqrt() } else { 0.0 };
+        weights.iter().zip(lamps).map(own).collect()
+    };
+    (0..lights).map(of).filter(|d| d.iter().any(|&v| v > 0.0)).collect()
 }
 
 /// Least and largest weight of a lamp that drifts by ± `drift`.
@@ -212,6 +224,45 @@ fn correlation(evidence: &[LightEvidence], weights: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
+    #[test]
+    fn daylight_is_open_and_a_lamp_is_not() {
+        let lamp = |light, drift| Lamp { name: "lamp".into(), light, power: 1.0, drift };
+        let steady = Light::new(&[2.0, 0.0, 4.0], &[lamp(0, 0.15), lamp(1, 0.3), lamp(1, 0.3)]);
+        let Light::Steady { weights, drifts } = &steady else { panic!("not steady") };
+        assert_eq!(weights, &[2.0, 0.0, 4.0]);
+        assert_eq!(drifts, &[vec![2.0 * 0.15 / 3f64.sqrt(), 0.0, 0.0], vec![0.0, 0.0, 4.0 * 0.3 / 3f64.sqrt()]]);
+        let Light::Open { ranges } = Light::new(&[2.0, 0.0], &[lamp(0, 0.1), lamp(1, 0.9)]) else { panic!("not open") };
+        // The lamp that keeps its power keeps its weight; the other gives what it was said to, in the photo's measure.
+        assert!((ranges[0][0] - 1.8).abs() < 1e-12 && (ranges[0][1] - 2.2).abs() < 1e-12);
+        assert!((ranges[1][0] - 0.1).abs() < 1e-12 && (ranges[1][1] - 1.9).abs() < 1e-12);
+    }
+
+    #[test]
+    fn open_light_leaves_contrast_and_takes_brightness() {
+        let surroundings = [true, true, false, false];
+        let dim = Grid::new(2, 2, vec![0.1, 0.1, 0.3, 0.05]);
+        let bright = Grid::new(2, 2, dim.values.iter().map(|v| v * 7.0).collect());
+        let light = Light::Open { ranges: vec![[0.1, 10.0]] };
+        let [a, b] = [dim.clone(), bright].map(|g| light.level(g, &surroundings));
+        assert!(a.values.iter().zip(&b.values).all(|(a, b)| (a - b).abs() < 1e-6));
+        assert!((a.at(0, 0) - 0.4).abs() < 1e-6 && (a.at(0, 1) - 1.2).abs() < 1e-6);
+        let seen = light.seen(std::slice::from_ref(&dim), 3, &surroundings);
+        assert_eq!(seen.len(), MIXES);
+        // A dark spot never clips; a bright one does where the exposure is long.
+        assert!(seen.iter().all(|g| (g.at(1, 1) - 0.2).abs() < 1e-5 && g.at(0, 1) < 1.2 + 1e-5));
+        assert!(seen.iter().any(|g| g.at(0, 1) < 1.0));
+    }
+
+    #[test]
+    fn mixes_fill_the_ranges_evenly() {
+        let n = 500;
+        for dimension in 0..4 {
+            let mut values: Vec<f64> = (0..n).map(|i| spread_evenly(i, 4)[dimension]).collect();
+            values.sort_by(f64::total_cmp);
+            let widest = values.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+            assert!(values[0] >= 0.0 && values[n - 1] < 1.0 && widest < 12.0 / n as f64, "{dimension}: {widest}");
+        }
+    }
 
     #[test]
     fn lamp_weights_come_back_in_spite_of_outliers() {

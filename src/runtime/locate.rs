@@ -89,7 +89,13 @@ impl Search {
             coarse_factor: locator.coarse,
             fine_factor: locator.fine,
             unsigned: locator.unsigned,
-            groups: locator.groups.iter().enumerate().filter(|(i, _)| Some(*i) != skipped).map(|(_, g)| group(g)).collect(),
+            groups: locator
+                .groups
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| Some(*i) != skipped)
+                .map(|(_, g)| group(g))
+                .collect(),
         }
     }
 

@@ -17,4 +17,5 @@ pub mod locate;
 pub mod model;
 pub mod photo;
 pub mod pose;
+pub mod row;
 pub mod window;

@@ -11,8 +11,9 @@ use crate::runtime::grid::Grid;
 use crate::runtime::judge::NodeImages;
 use crate::runtime::light::Light;
 use crate::runtime::locate::EdgePoint;
-use crate::runtime::model::{Disturbed, Hypothesis, Image, Locator, Node, PointGroup, PointSet};
+use crate::runtime::model::{Disturbed, Hypothesis, Image, Lamp, Locator, Node, PointGroup, PointSet};
 use crate::runtime::pose::Pose;
+use crate::runtime::row::Row;
 use crate::runtime::window::{Window, runs_of};
 use crate::view::item_buffer::Mask;
 use crate::view::nodes::dilate;
@@ -43,7 +44,7 @@ pub struct Context<'a> {
     pub shots: &'a Shots,
     /// Lamp powers before calibration, in photo units.
     pub powers: &'a [f64],
-    pub drift: &'a [f64],
+    pub lamps: &'a [Lamp],
 }
 
 /// The draws of one hypothesis: shots with the shift of the node in each (node px).
@@ -71,8 +72,13 @@ pub fn node(context: &Context, plan: &NodePlan) -> Option<Node> {
 
 /// The good state, every mode, and the good state beside the faults of others; long sweeps in pieces.
 fn samples<'a>(context: &'a Context, plan: &NodePlan) -> Vec<Sample<'a>> {
-    let sample =
-        |fault, sweep, shots: Vec<&'a Shot>| Sample { by: None, fault, sweep, shifts: vec![[0.0; 2]; shots.len()], shots };
+    let sample = |fault, sweep, shots: Vec<&'a Shot>| Sample {
+        by: None,
+        fault,
+        sweep,
+        shifts: vec![[0.0; 2]; shots.len()],
+        shots,
+    };
     let mut out = vec![sample("good", String::new(), context.shots.good.iter().collect())];
     for &m in &plan.modes {
         let mode = &context.modes[m];
@@ -129,10 +135,10 @@ impl Cutter<'_> {
         let (mut hypotheses, mut disturbed) = (Vec::new(), Vec::new());
         for (sample, draws) in samples.iter().zip(&cut) {
             let images = quantised(draws, &steps);
-            let state = Hypothesis { fault: sample.fault.into(), sweep: sample.sweep.clone(), images };
+            let fault = sample.fault.into();
             match sample.by {
-                None => hypotheses.push(state),
-                Some(by) => disturbed.push(Disturbed { by, state }),
+                None => hypotheses.push(Hypothesis { fault, sweep: sample.sweep.clone(), images }),
+                Some(by) => disturbed.push(Disturbed { by, fault, images }),
             }
         }
         let (plan, frame) = (self.plan, self.plan.frame);
@@ -142,6 +148,7 @@ impl Cutter<'_> {
             level: 1,
             plane: frame.plane,
             factor: frame.factor,
+            levels: self.context.design.train.levels,
             origin: frame.origin,
             size: frame.size,
             visible: plan.visible,
@@ -171,8 +178,8 @@ impl Cutter<'_> {
     fn align(&self, node: &Node, samples: &mut [Sample]) -> Option<()> {
         let context = self.context;
         let images = NodeImages::new(node, context.camera, &context.home, context.powers.len())?;
-        let powers = Light::new(context.powers, context.powers, context.drift);
-        let densities = images.densities(&powers, ALIGN_NOISE);
+        let powers = Light::new(context.powers, context.lamps);
+        let densities = images.densities(&powers, ALIGN_NOISE, &[]);
         let factor = (self.plan.frame.factor / context.plan.base) as usize;
         for (sample, density) in samples.iter_mut().zip(&densities) {
             for (shot, shift) in sample.shots.iter().zip(&mut sample.shifts) {
@@ -194,8 +201,8 @@ fn step(cut: &[Vec<Vec<Grid>>], lamp: usize) -> f64 {
 }
 
 fn quantised(draws: &[Vec<Grid>], steps: &[f64]) -> Vec<Image> {
-    let row = |row: &[f32], step: f64| -> Vec<u16> {
-        row.iter().map(|&v| (f64::from(v) / step).round().clamp(0.0, f64::from(u16::MAX)) as u16).collect()
+    let row = |row: &[f32], step: f64| -> Row {
+        Row(row.iter().map(|&v| (f64::from(v) / step).round().clamp(0.0, f64::from(u16::MAX)) as u16).collect())
     };
     let mut out = Vec::new();
     for (draw, lamps) in draws.iter().enumerate() {

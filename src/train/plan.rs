@@ -149,7 +149,17 @@ fn node(
     let shown = view.good.bbox(component).or_else(|| changed.bbox())?;
     let visible = [shown.x0, shown.y0, shown.x1, shown.y1].map(|v| f64::from(v * base));
     let spread = spread(component, design, camera, view.drawn);
-    Some(NodePlan { component, frame, mask, visible, modes, changed, spread, disturbs: Vec::new(), disturbed: Vec::new() })
+    Some(NodePlan {
+        component,
+        frame,
+        mask,
+        visible,
+        modes,
+        changed,
+        spread,
+        disturbs: Vec::new(),
+        disturbed: Vec::new(),
+    })
 }
 
 /// px of the photo per px of the node.
@@ -243,7 +253,9 @@ fn disturb(nodes: &mut [NodePlan], scenes: &[Vec<usize>], changes: &[Option<Mask
         let least = (TOUCHES * node.changed.count() as f64).max(LEAST_PIXELS as f64);
         let touches = |m: usize| {
             let change = changes[m].as_ref();
-            change.is_some_and(|c| c.bits.iter().zip(&node.changed.bits).filter(|(a, b)| **a && **b).count() as f64 >= least)
+            change.is_some_and(|c| {
+                c.bits.iter().zip(&node.changed.bits).filter(|(a, b)| **a && **b).count() as f64 >= least
+            })
         };
         for scene in scenes {
             let touching: Vec<usize> = scene.iter().copied().filter(|&m| touches(m)).collect();

@@ -70,7 +70,11 @@ pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, inde
     let open = inspect::light(model, &customer.powers).is_open();
     let mut drifted = |(&power, lamp): (&f64, &Lamp)| {
         let u = stream.uniform();
-        if open { within(&range(power, lamp.drift), u) } else { (power * (1.0 + lamp.drift * (2.0 * u - 1.0))).max(0.0) }
+        if open {
+            within(&range(power, lamp.drift), u)
+        } else {
+            (power * (1.0 + lamp.drift * (2.0 * u - 1.0))).max(0.0)
+        }
     };
     let weights: Vec<f64> = customer.powers.iter().zip(&model.station.lamps).map(&mut drifted).collect();
     let mut light = Grid::filled(lamps[0].width, lamps[0].height, 0.0);
