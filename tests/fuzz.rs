@@ -316,8 +316,8 @@ fn specs_up_to_the_view() {
     let specs = specs();
     let specs: Vec<&str> = specs.iter().map(String::as_str).collect();
     // The small ones: a check of the pattern wheel takes long.
-    fuzz("spec", 60, targets::spec, |draw| {
-        let spec = draw.one(&specs[..3]);
+    fuzz("spec", 40, targets::spec, |draw| {
+        let spec = draw.one(&specs[..2]);
         text_damaged(spec, &specs, draw).into_bytes()
     });
 }

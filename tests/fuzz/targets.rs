@@ -7,9 +7,10 @@ use gonogo::runtime::camera::Camera;
 use gonogo::runtime::grid::Grid;
 use gonogo::runtime::inspect::{Decision, Inspector};
 use gonogo::runtime::model::{
-    self, Hypothesis, Install, Lamp, Locator, Model, Node, PointGroup, PointSet, Promise, Rate, Station,
+    self, Disturbed, Hypothesis, Install, Lamp, Locator, Model, Node, PointGroup, PointSet, Promise, Rate, Station,
 };
 use gonogo::runtime::photo::{Photo, Tone};
+use gonogo::runtime::row::Row;
 
 /// The bytes of an image file. Small sizes only: what is refused for its size tells nothing.
 pub fn photo(bytes: &[u8]) {
@@ -99,7 +100,7 @@ pub fn tiny() -> Model {
         fault: fault.into(),
         sweep: String::new(),
         images: (0..3)
-            .map(|draw| model::Image { draw, lamp: 0, rows: vec![vec![7 + draw as u16, 8, value, 10]; 4] })
+            .map(|draw| model::Image { draw, lamp: 0, rows: vec![Row(vec![7 + draw as u16, 8, value, 10]); 4] })
             .collect(),
     };
     let rate = Rate { events: 0, trials: 10, upper_95: 0.3085 };
@@ -119,7 +120,7 @@ pub fn tiny() -> Model {
             install: Install { position_mm: 1.0, angle_rad: 0.01, focal_share: 0.005, k1: [0.0, 0.0] },
             standing: [[-1.0, 1.0], [-1.0, 1.0], [0.0, 0.0], [-0.1, 0.1]],
             noise: 0.01,
-            lamps: vec![Lamp { name: "key".into(), power: 1.0, drift: 0.15 }],
+            lamps: vec![Lamp { name: "key".into(), light: 0, power: 1.0, drift: 0.15 }],
             least_correlation: -1.0,
         },
         promise: Promise { false_reject_asked: 0.01, false_reject: rate, escape: rate, modes: vec![] },
@@ -136,6 +137,7 @@ pub fn tiny() -> Model {
             level: 1,
             plane: 0.0,
             factor: 1,
+            levels: 2,
             origin: [8, 8],
             size: [4, 4],
             visible: [9.0, 9.0, 11.0, 11.0],
@@ -147,6 +149,7 @@ pub fn tiny() -> Model {
             good_scores: vec![0.1, 0.2],
             fault_scores: vec![],
             hypotheses: vec![images("good", 90), images("missing", 9)],
+            disturbed: vec![Disturbed { by: 0, fault: "missing".into(), images: images("missing", 40).images }],
         }],
     }
 }
