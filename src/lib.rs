@@ -96,7 +96,7 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     line.keep(|made| made.analysis = Some(found.0.clone()));
     let analysis = line.check(found)?;
     let trees = assembly::error_tree::object_tree(&design, &analysis.liaison).trees;
-    let modes = || assembly::fault::modes(&design, &analysis.liaison, &analysis.insertion, &solids);
+    let modes = || assembly::fault::all(&design, &analysis.liaison, &analysis.insertion, &solids);
     line.keep(|made| (made.trees, made.modes) = (trees.clone(), modes()));
     line.emit_assembly(&design, &solids, &analysis, &trees);
 
