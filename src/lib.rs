@@ -88,13 +88,13 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
 
     line.enter(Stage::Assembly)?;
     let analysis = line.check(assembly::analyse(&design, &solids))?;
-    let trees = assembly::error_tree::object_tree(&design, &analysis.liaison).trees;
     let modes = || assembly::fault::modes(&design, &analysis.liaison, &analysis.insertion, &solids);
-    line.emit_assembly(&design, &solids, &analysis, &trees);
+    line.emit_assembly(&design, &solids, &analysis);
 
     line.enter(Stage::View)?;
     let bodies = line::bodies(&design, station, &solids);
-    let choice = view::choose::choose(&design, station, &bodies, &view::choose::targets(&trees));
+    let targets = view::choose::targets(&assembly::error_tree::levels(&design, &analysis.liaison));
+    let choice = view::choose::choose(&design, station, &bodies, &targets);
     let camera = line.check((choice.camera, choice.diagnostics.clone()))?;
     line.emit(Artifact::View, || artifacts::view(&design, station, &choice));
     line.emit_files(Artifact::Images, || artifacts::images::pictures(&design, station, &camera, &modes()));

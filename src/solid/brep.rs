@@ -9,7 +9,7 @@ use super::corner::sharpest;
 use super::csg::{Leaf, Side, Tree};
 use super::locus::Locus;
 use super::measure::{self, Flux, Run};
-use super::ring::{Ring, lay_out, offsets};
+use super::ring::{Reach, Ring, lay_out, offsets};
 use super::{Edge, Face, Quality, Solid, Surface, TriMesh};
 use crate::diag::Diagnostic;
 use nalgebra::{Point3, Unit, Vector3};
@@ -249,10 +249,12 @@ fn group(tree: &Tree, sheet: Sheet, loops: Vec<Loop>, edges: &[Edge], corners: u
     let south = rings.len();
     let bottomless = surface.poles()[0].is_some() || surface.period_across().is_some();
     let mut parent: Vec<usize> = (0..=south).collect();
+    let reaches: Vec<Reach> = rings.iter().map(Ring::reach).collect();
     for (i, ring) in rings.iter().enumerate().filter(|(_, r)| !r.is_outer() && r.winding != 1) {
         let low = ring.lowest();
         let hit = |j: usize| rings[j].below(low).map(|v| (v, j));
-        let below = (0..rings.len()).filter(|j| *j != i).filter_map(hit).max_by(|a, b| a.0.total_cmp(&b.0));
+        let near = (0..rings.len()).filter(|j| *j != i && reaches[*j].may_cross(low));
+        let below = near.filter_map(hit).max_by(|a, b| a.0.total_cmp(&b.0));
         if below.is_none() && !bottomless {
             return Err(vec![internal(tree, "a hole lies in no face")]);
         }
