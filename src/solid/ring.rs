@@ -256,7 +256,8 @@ impl Reach {
     /// Whether a ray down from `p` may cross the ring.
     pub fn may_cross(&self, p: [f64; 2]) -> bool {
         let off = p[0] - self.u[0];
-        let off = if self.period > 0.0 { (off + tolerance::WELD).rem_euclid(self.period) } else { off + tolerance::WELD };
+        let off =
+            if self.period > 0.0 { (off + tolerance::WELD).rem_euclid(self.period) } else { off + tolerance::WELD };
         (0.0..=self.u[1] - self.u[0] + 2.0 * tolerance::WELD).contains(&off) && self.lowest <= p[1] + tolerance::WELD
     }
 }

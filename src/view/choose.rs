@@ -148,7 +148,8 @@ impl<'a> Search<'a> {
         let counts = buffer.counts();
         let area = self.reduction * self.reduction;
         let of_target = |t: &Target| area * counts.get(&(t.component, t.face)).copied().unwrap_or(0);
-        let of_component = |component: usize| counts.range((component, 0)..=(component, u32::MAX)).map(|c| c.1).sum::<u32>();
+        let of_component =
+            |component: usize| counts.range((component, 0)..=(component, u32::MAX)).map(|c| c.1).sum::<u32>();
         let worth = |t: &Target| t.weight * (f64::from(of_target(t)) / f64::from(LEAST_PIXELS)).ln_1p();
         Scored {
             placing,
@@ -373,7 +374,8 @@ mod tests {
     fn a_face_weighs_less_the_lower_it_stands() {
         let face = |component, face| FaceRef { component, face };
         let levels = BTreeMap::from([(face(2, 0), 0), (face(1, 2), 2), (face(0, 5), 1)]);
-        let weights: Vec<(usize, u32, f64)> = targets(&levels).iter().map(|t| (t.component, t.face, t.weight)).collect();
+        let weights: Vec<(usize, u32, f64)> =
+            targets(&levels).iter().map(|t| (t.component, t.face, t.weight)).collect();
         assert_eq!(weights, [(0, 5, 0.5), (1, 2, 0.25), (2, 0, 1.0)]);
     }
 

@@ -3,9 +3,9 @@
 //! In: bodies in the station's frame and a [`Camera`]. Out: an [`ItemBuffer`]: identities, counts, boxes, masks. Never
 //! shades, never knows a design. How it is drawn: `raster`.
 
-pub(super) use super::raster::Stamps;
 use super::raster::Canvas;
 pub use super::raster::PixelGrid;
+pub(super) use super::raster::Stamps;
 use crate::runtime::camera::{Camera, Vec3, dot};
 use crate::scene::Body;
 use std::collections::BTreeMap;
