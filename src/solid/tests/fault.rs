@@ -59,7 +59,7 @@ fn inside_out(arrangement: &mut arrange::Arrangement) {
 
 /// Draws the outline of the plate's underside through its bore.
 fn move_corner(arrangement: &mut arrange::Arrangement) {
-    let is_there = |p: &&mut Point3<f64>| p.x > 1.0 && p.y > 1.0 && p.z < 1.0;
+    let is_there = |p: &&mut Point3<f64>| p.x > 1.0 && p.y < -1.0 && p.z < 1.0;
     arrangement.corners.iter_mut().filter(is_there).for_each(|p| *p = Point3::origin());
 }
 
