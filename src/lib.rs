@@ -28,6 +28,8 @@ pub mod exchange;
 #[cfg(feature = "compile")]
 pub mod render;
 #[cfg(feature = "compile")]
+pub mod report;
+#[cfg(feature = "compile")]
 pub mod scene;
 #[cfg(feature = "compile")]
 pub mod solid;
@@ -54,7 +56,7 @@ mod line;
 pub mod cli;
 
 #[cfg(feature = "compile")]
-pub use line::{Compiled, Observer, Options, Progress, Stage};
+pub use line::{Compiled, Made, Observer, Options, Progress, Stage};
 
 #[cfg(feature = "compile")]
 use artifacts::Artifact;
@@ -77,24 +79,32 @@ pub fn compile(spec: &str, read: design::Read, options: &Options, observer: &Obs
 fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     line.enter(Stage::Design)?;
     let design = line.loaded(design::load(spec, read, &line.options.set))?;
+    line.keep(|made| (made.digest, made.design) = (line::digest(&design), Some(design.clone())));
     let station = line.accept(line::station(&design, line.options.station.as_deref()))?;
+    line.keep(|made| made.station = design.stations.iter().position(|s| s.name == station.name).unwrap_or(0));
     line.emit(Artifact::Design, || artifacts::design(&design));
 
     line.enter(Stage::Solid)?;
     let shapes = line.accept(line::shapes(&design))?;
     let solids = line::per_component(&design, &shapes);
+    line.keep(|made| made.solids = solids.clone());
     line.emit(Artifact::Brep, || artifacts::brep(&design, &shapes));
     line.emit_files(Artifact::Step, || artifacts::exchange::step(&design, &solids));
 
     line.enter(Stage::Assembly)?;
-    let analysis = line.check(assembly::analyse(&design, &solids))?;
+    let found = assembly::analyse(&design, &solids);
+    line.keep(|made| made.analysis = Some(found.0.clone()));
+    let analysis = line.check(found)?;
     let modes = || assembly::fault::modes(&design, &analysis.liaison, &analysis.insertion, &solids);
+    let trees = || assembly::error_tree::object_tree(&design, &analysis.liaison).trees;
+    line.keep(|made| (made.trees, made.modes) = (trees(), modes()));
     line.emit_assembly(&design, &solids, &analysis);
 
     line.enter(Stage::View)?;
     let bodies = line::bodies(&design, station, &solids);
     let targets = view::choose::targets(&assembly::error_tree::levels(&design, &analysis.liaison));
     let choice = view::choose::choose(&design, station, &bodies, &targets);
+    line.keep(|made| (made.bodies, made.choice) = (bodies.clone(), Some(choice.clone())));
     let camera = line.check((choice.camera, choice.diagnostics.clone()))?;
     line.emit(Artifact::View, || artifacts::view(&design, station, &choice));
     line.emit_files(Artifact::Images, || artifacts::images::pictures(&design, station, &camera, &modes()));

@@ -3,7 +3,7 @@
 
 use crate::artifacts::{self, Artifact, pictures};
 use crate::assembly::Analysis;
-use crate::assembly::error_tree::object_tree;
+use crate::assembly::error_tree::{ErrorTree, object_tree};
 use crate::assembly::fault::{self, ErrorMode, FaultKind};
 use crate::assembly::liaison::Liaison;
 use crate::assembly::piece::Workshop;
@@ -17,6 +17,7 @@ use crate::scene::Body;
 use crate::scene::build::{self, Instance};
 use crate::solid::{Quality, Solid};
 use crate::train::{Step, shots};
+use crate::view::choose::Choice;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -29,6 +30,8 @@ pub struct Options {
     pub set: Vec<(String, String)>,
     /// What is asked for; the line stops after the last stage it takes.
     pub wanted: BTreeSet<Artifact>,
+    /// Keep what the stages make on the way, for a report.
+    pub keep: bool,
 }
 
 /// What came of a spec.
@@ -43,6 +46,26 @@ pub struct Compiled {
     pub sources: Sources,
     /// The files that were read.
     pub inputs: Vec<String>,
+    /// What the stages made on the way, if [`Options::keep`] asked for it.
+    pub made: Made,
+}
+
+/// What the stages made, each as far as the line came.
+#[derive(Debug, Default)]
+pub struct Made {
+    pub design: Option<Design>,
+    /// Digest of the design, as models carry it.
+    pub digest: String,
+    /// The station asked for: an index into [`Design::stations`].
+    pub station: usize,
+    /// One solid per component, at nominal.
+    pub solids: Vec<Arc<Solid>>,
+    pub analysis: Option<Analysis>,
+    pub trees: Vec<ErrorTree>,
+    /// The nominal assembly in the middle of where it may stand.
+    pub bodies: Vec<Body>,
+    pub choice: Option<Choice>,
+    pub modes: Vec<ErrorMode>,
 }
 
 /// The stages as progress tells them, in running order.
@@ -139,6 +162,13 @@ impl<'a> Line<'a> {
         let stops = found.iter().any(Diagnostic::is_error);
         self.out.diagnostics.extend(found);
         (!stops).then_some(output)
+    }
+
+    /// Keeps what a stage made if that is asked for.
+    pub fn keep(&mut self, put: impl FnOnce(&mut Made)) {
+        if self.options.keep {
+            put(&mut self.out.made);
+        }
     }
 
     /// Keeps an artifact if it is wanted.

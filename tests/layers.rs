@@ -24,6 +24,10 @@ const HOUSE: &[(&str, &[&str])] = &[
         "train",
         &["view", "render", "scene", "assembly", "solid", "variation", "design", "runtime", "diag", "units", "rng"],
     ),
+    (
+        "report",
+        &["train", "view", "scene", "exchange", "drawing", "assembly", "solid", "design", "runtime", "diag", "units"],
+    ),
     ("golden", &[]),
     (
         "artifacts",

@@ -62,6 +62,8 @@ pub enum Command {
     Calibrate(Calibrate),
     /// Judge photos: exit code 0 all go, 1 any no-go, 2 any that could not be judged.
     Inspect(Inspect),
+    /// Write a page that shows the assembly in 3-D, what can be told about it, and judged photos.
+    Report(Report),
     /// Explain a diagnostic: `gonogo explain E0305`.
     Explain(Explain),
     /// Compare the outputs of the stages with blessed ones, or bless them.
@@ -166,6 +168,31 @@ pub enum VerdictFormat {
     Json,
     /// One test case a photo.
     Junit,
+}
+
+#[derive(Debug, Args)]
+pub struct Report {
+    /// The spec, or `-` for standard input.
+    pub spec: PathBuf,
+    /// Photos to judge with the model; they need `--model`.
+    #[arg(requires = "model")]
+    pub photos: Vec<PathBuf>,
+    /// The station to show: the model's, or the first of the spec, unless given.
+    #[arg(long, value_name = "NAME")]
+    pub station: Option<String>,
+    /// The model compiled from the spec: adds what it promises, its templates, and verdicts on photos.
+    #[arg(long, value_name = "MODEL")]
+    pub model: Option<PathBuf>,
+    /// What `gonogo calibrate` wrote. Without it, camera and lamps are taken to be as the spec says.
+    #[arg(long, value_name = "FILE", requires = "model")]
+    pub calibration: Option<PathBuf>,
+    /// Where the page goes: one HTML file that needs no other.
+    #[arg(short, long, value_name = "PAGE", default_value = "report.html")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub variant: Variant,
+    #[command(flatten)]
+    pub jobs: Jobs,
 }
 
 #[derive(Debug, Args)]

@@ -20,8 +20,12 @@ pub fn compile(args: &Compile, global: &Global) -> Result<Exit, Failure> {
     output::probe(&outputs.model)?;
     args.deps.iter().try_for_each(|deps| output::probe(deps))?;
     let spec = Document::read(&args.spec)?;
-    let options =
-        Options { station: args.station.clone(), set: args.variant.set.clone(), wanted: outputs.wanted.clone() };
+    let options = Options {
+        station: args.station.clone(),
+        set: args.variant.set.clone(),
+        wanted: outputs.wanted.clone(),
+        keep: false,
+    };
     let compiled = args.jobs.run(|| run(&spec, &options, global))?;
     if !report(&compiled, &args.variant, global)? {
         return Ok(Exit::Faults);
@@ -41,8 +45,12 @@ pub fn check(args: &Check, global: &Global) -> Result<Exit, Failure> {
     let mut exit = Exit::Fine;
     for path in &args.specs {
         let spec = Document::read(path)?;
-        let options =
-            Options { station: None, set: args.variant.set.clone(), wanted: BTreeSet::from([Artifact::View]) };
+        let options = Options {
+            station: None,
+            set: args.variant.set.clone(),
+            wanted: BTreeSet::from([Artifact::View]),
+            keep: false,
+        };
         let compiled = run(&spec, &options, global);
         if !report(&compiled, &args.variant, global)? {
             exit = Exit::Faults;

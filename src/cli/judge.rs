@@ -34,7 +34,7 @@ pub fn calibrate(args: &Calibrate) -> Result<Exit, Failure> {
 /// Judges photos one after the other. A photo that cannot be read is a verdict of its own and stops nothing.
 pub fn inspect(args: &Inspect) -> Result<Exit, Failure> {
     let model = read_model(&args.model)?;
-    let calibration = calibration(args, &model)?;
+    let calibration = calibration(args.calibration.as_deref(), &model)?;
     let inspector = inspector(&model, &calibration)?;
     if let Some(dir) = &args.overlay {
         output::make_dir(dir)?;
@@ -137,8 +137,9 @@ pub fn inspector<'a>(model: &'a Model, calibration: &'a Calibration) -> Result<I
     Inspector::new(model, calibration).ok_or_else(unusable)
 }
 
-fn calibration(args: &Inspect, model: &Model) -> Result<Calibration, Failure> {
-    let Some(path) = &args.calibration else {
+/// The calibration in a file; without one the station as the spec describes it, and a warning.
+pub fn calibration(path: Option<&Path>, model: &Model) -> Result<Calibration, Failure> {
+    let Some(path) = path else {
         output::remark("warning: not calibrated: camera and lamps are taken to be as the spec says");
         output::remark("  help: gonogo calibrate MODEL PHOTO -o CALIBRATION, with one photo of a correct assembly");
         return Ok(Calibration::nominal(model));

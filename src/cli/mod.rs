@@ -14,6 +14,7 @@ mod output;
 mod overlay;
 mod progress;
 pub mod report;
+mod report_page;
 mod verdict;
 
 use args::{Cli, Command, Explain, Golden};
@@ -55,6 +56,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Fmt(args) => format::format(args, global),
         Command::Calibrate(args) => judge::calibrate(args),
         Command::Inspect(args) => judge::inspect(args),
+        Command::Report(args) => report_page::report(args, global),
         Command::Explain(args) => explain(args),
         Command::Golden(Golden::Check(args)) => golden::check(args, global),
         Command::Golden(Golden::Bless(args)) => golden::bless(args, global),

@@ -8,3 +8,8 @@ pub fn json(value: &impl Serialize) -> String {
     text.push('\n');
     text
 }
+
+/// The same on one line.
+pub fn compact(value: &impl Serialize) -> String {
+    serde_json::to_string(value).expect("plain data always serialises")
+}

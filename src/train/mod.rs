@@ -8,7 +8,7 @@ mod edges;
 mod fit;
 pub mod plan;
 pub mod shots;
-mod stats;
+pub mod stats;
 pub mod synthesise;
 pub mod verify;
 
@@ -37,7 +37,7 @@ const EXPOSED_TO: f64 = 0.6;
 const EXPOSED_QUANTILE: f64 = 0.95;
 
 /// A mode of which more than this share escapes is worth a warning.
-const WEAK: f64 = 0.1;
+pub const WEAK: f64 = 0.1;
 
 /// What training starts from.
 pub struct Job<'a> {

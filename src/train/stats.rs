@@ -7,6 +7,12 @@ pub fn rate(events: u32, trials: u32) -> Rate {
     Rate { events, trials, upper_95: rounded(upper(events, trials, 0.975)) }
 }
 
+/// The lower end of the same interval.
+pub fn lower_95(rate: &Rate) -> f64 {
+    let kept = rate.trials.saturating_sub(rate.events);
+    rounded(1.0 - upper(kept, rate.trials, 0.975))
+}
+
 /// The p at which seeing at most `events` in `trials` has probability 1 - confidence.
 fn upper(events: u32, trials: u32, confidence: f64) -> f64 {
     if events >= trials {
@@ -69,5 +75,7 @@ mod tests {
         // 2 of 20: upper end 0.3170 (Clopper and Pearson's chart; any statistics package).
         assert!((rate(2, 20).upper_95 - 0.3170).abs() < 2e-4);
         assert_eq!(rate(5, 5).upper_95, 1.0);
+        assert_eq!(lower_95(&rate(0, 33)), 0.0);
+        assert!((lower_95(&rate(2, 20)) - 0.0123).abs() < 2e-4);
     }
 }
