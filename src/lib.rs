@@ -95,7 +95,7 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     let found = assembly::analyse(&design, &solids);
     line.keep(|made| made.analysis = Some(found.0.clone()));
     let analysis = line.check(found)?;
-    let modes = || assembly::fault::modes(&design, &analysis.liaison, &analysis.insertion, &solids);
+    let modes = || assembly::fault::all(&design, &analysis.liaison, &analysis.insertion, &solids);
     let trees = || assembly::error_tree::object_tree(&design, &analysis.liaison).trees;
     line.keep(|made| (made.trees, made.modes) = (trees(), modes()));
     line.emit_assembly(&design, &solids, &analysis);

@@ -475,7 +475,7 @@ fn node(node: &Node) -> NodeSummary<'_> {
 }
 
 fn hypothesis(hypothesis: &Hypothesis) -> (&str, &str, usize, f64, f64) {
-    let values = || hypothesis.images.iter().flat_map(|i| i.rows.iter().flatten()).map(|&v| f64::from(v));
+    let values = || hypothesis.images.iter().flat_map(|i| i.rows.iter().flat_map(|row| &row.0)).map(|&v| f64::from(v));
     let count = values().count().max(1) as f64;
     let mean = values().sum::<f64>() / count;
     let spread = (values().map(|v| (v - mean).powi(2)).sum::<f64>() / count).sqrt();

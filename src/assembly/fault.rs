@@ -98,8 +98,15 @@ pub fn modes(design: &Design, liaison: &Liaison, insertion: &Insertion, solids: 
     watched.flat_map(of_one).collect()
 }
 
-/// For every watched component the other parts that could stand in its place. Apart from [`modes`]: who renders them has
-/// to change the solid and its material, and they are the least likely of errors.
+/// [`modes`] and after them [`wrong_parts`].
+pub fn all(design: &Design, liaison: &Liaison, insertion: &Insertion, solids: &[Arc<Solid>]) -> Vec<ErrorMode> {
+    let mut all = modes(design, liaison, insertion, solids);
+    all.extend(wrong_parts(design, liaison, solids));
+    all
+}
+
+/// For every watched component the other parts that could stand in its place. Who renders them changes the finish with
+/// the solid.
 pub fn wrong_parts(design: &Design, liaison: &Liaison, solids: &[Arc<Solid>]) -> Vec<ErrorMode> {
     let watched = design.inspect.watch.iter().map(|w| w.component).filter(|c| *c != 0);
     let of_one = |component: usize| {

@@ -89,7 +89,7 @@ impl Resolver {
         Train {
             images: self.whole_or(&fields, "images", 14, [1, 10_000]) as u32,
             seed: self.whole_or(&fields, "seed", 1, [0, LARGEST_SEED]),
-            levels: self.whole_or(&fields, "levels", 2, [1, 8]) as u32,
+            levels: self.whole_or(&fields, "levels", 4, [1, 8]) as u32,
             samples: self.whole_or(&fields, "samples", 16, [1, 65_536]) as u32,
             uniform: self.word_or(&fields, "draw", &[("uniform", true), ("nominal", false)], true),
         }

@@ -59,7 +59,7 @@ pub fn expected(node: &Node, hypothesis: usize, weights: &[f64]) -> Grid {
     for image in images {
         let lamp = image.lamp as usize;
         let weight = weights.get(lamp).copied().unwrap_or(0.0) * node.steps.get(lamp).copied().unwrap_or(0.0) / draws;
-        let values = image.rows.iter().flatten().map(|v| f32::from(*v) * weight as f32);
+        let values = image.rows.iter().flat_map(|row| &row.0).map(|v| f32::from(*v) * weight as f32);
         sum.values.iter_mut().zip(values).for_each(|(s, v)| *s += v);
     }
     sum.values.iter_mut().for_each(|v| *v = v.min(1.0));

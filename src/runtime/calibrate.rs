@@ -5,13 +5,15 @@
 //! own reflectance is not calibrated: parts differ.
 
 use super::grid::Grid;
-use super::inspect::{Decision, Inspector};
-use super::judge::{LightFit, Prepared, fit_lamps};
+use super::inspect::{Finding, Inspector, NodeReport, light};
+use super::judge::{NodeImages, Prepared};
+use super::light::{LightFit, fit_lamps};
 use super::linear;
 use super::locate::{Fields, Search};
-use super::model::{self, Model, ModelError};
+use super::model::{self, Model, ModelError, Node};
 use super::photo::Photo;
 use super::pose::{Installation, Pose};
+use super::row::Row;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -19,8 +21,10 @@ use std::fmt;
 const PRIOR_PULL: f64 = 1e-3;
 /// Sensor noise that every 8-bit photo has: the rounding (share of full scale).
 const ROUNDING: f64 = 1.0 / (255.0 * 3.464);
+/// The fault that comes in any size.
+const SLIGHT: &str = "not seated";
 /// Format of the calibration file.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 
 /// What one photo tells about a station.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -39,6 +43,42 @@ pub struct Calibration {
     /// Locator's score and correlation of the photo's gradients with the re-synthesis.
     pub score: f64,
     pub correlation: f64,
+    /// Per photo what the nodes showed.
+    pub references: Vec<Reference>,
+}
+
+/// What the nodes showed in one photo of a correct assembly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// Per node of the model its window, row by row, in steps of 1/4000 of full scale.
+    pub windows: Vec<Vec<Row>>,
+}
+
+/// Steps of a reference's grey values.
+const GREY_STEPS: f32 = 4000.0;
+
+impl Reference {
+    fn of(windows: &[Grid]) -> Reference {
+        let value = |v: &f32| (v * GREY_STEPS).round().clamp(0.0, f32::from(u16::MAX)) as u16;
+        let rows = |g: &Grid| g.values.chunks(g.width).map(|row| Row(row.iter().map(value).collect())).collect();
+        Reference { windows: windows.iter().map(rows).collect() }
+    }
+
+    /// The window of a node.
+    pub fn window(&self, node: usize) -> Grid {
+        let rows = &self.windows[node];
+        let values = rows.iter().flat_map(|row| &row.0).map(|&v| f32::from(v) / GREY_STEPS).collect();
+        Grid::new(rows.first().map_or(0, |row| row.0.len()), rows.len(), values)
+    }
+
+    /// Whether the windows are those of the model's nodes.
+    fn fits(&self, model: &Model) -> bool {
+        let fits = |(rows, node): (&Vec<Row>, &Node)| {
+            rows.len() == node.size[1] as usize && rows.iter().all(|row| row.0.len() == node.size[0] as usize)
+        };
+        self.windows.len() == model.nodes.len() && self.windows.iter().zip(&model.nodes).all(fits)
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -96,6 +136,7 @@ impl Calibration {
             poses: Vec::new(),
             score: 0.0,
             correlation: 0.0,
+            references: Vec::new(),
         }
     }
 
@@ -114,25 +155,38 @@ impl Calibration {
         }
         let finite = calibration.lamps.iter().chain(&calibration.installation.to_array()).all(|v| v.is_finite());
         let lamps = calibration.lamps.len() == model.station.lamps.len();
-        if !finite || !lamps || calibration.noise.is_nan() || calibration.noise <= 0.0 {
+        let references = calibration.references.iter().all(|r| r.fits(model));
+        if !finite || !lamps || !references || calibration.noise.is_nan() || calibration.noise <= 0.0 {
             return Err(malformed("the calibration's numbers are out of range"));
         }
         Ok(calibration)
     }
 }
 
-/// Calibrates `model` by photos of correct assemblies; the first fixes light and noise, all fix the camera.
+/// Calibrates `model` by photos of correct assemblies; the first fixes light and noise, all fix the camera and show what
+/// no render knows.
 pub fn calibrate(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationError> {
     let calibration = fit(model, photos)?;
-    let inspector = Inspector::new(model, &calibration).ok_or(CalibrationError::Unusable)?;
+    // Photos must be right by the renders alone: what they show is not taken for granted yet.
+    let naive = Calibration { references: Vec::new(), ..calibration.clone() };
+    let inspector = Inspector::new(model, &naive).ok_or(CalibrationError::Unusable)?;
     for photo in photos {
         let verdict = inspector.inspect(photo);
-        if let (Decision::NoGo, Some(finding)) = (verdict.decision, verdict.findings.first()) {
+        let proven =
+            |f: &&Finding| model.nodes.iter().zip(&verdict.nodes).any(|(n, r)| n.name == f.component && proves(n, r));
+        if let Some(finding) = verdict.findings.iter().find(proven) {
             let (component, fault) = (finding.component.clone(), finding.fault.clone());
             return Err(CalibrationError::Faulty { component, fault });
         }
     }
     Ok(calibration)
+}
+
+/// Whether a node's verdict by renders alone proves a fault. Under a light that is not quite the described one a sound part
+/// can look a little raised; it must look as raised as half the held-out faults. It never looks like none.
+fn proves(node: &Node, report: &NodeReport) -> bool {
+    let typical = node.fault_scores.get(node.fault_scores.len() / 2).copied().unwrap_or(0.0);
+    report.faulty && (report.best_fault != SLIGHT || report.score < typical)
 }
 
 /// The calibration without the question whether the photos show a fault.
@@ -150,11 +204,30 @@ pub fn fit(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationEr
     let evidence = prepared.light_evidence(&pyramid, &camera, &poses[0], &good);
     let LightFit { weights, correlation } = fit_lamps(&evidence, &prior, PRIOR_PULL);
     let least = model.station.least_correlation;
-    if correlation < least {
+    // Under open light no photo is like the mean of the renders, and the next one has other lamps.
+    if correlation < least && !light(model, &weights).is_open() {
         return Err(CalibrationError::PoorFit { correlation, least });
     }
+    let light = light(model, &weights);
+    let reference = |(photo, pose): (&Photo, &Pose)| {
+        let pyramid = prepared.pyramid(&photo.light);
+        let window =
+            |node: &NodeImages| node.reference(&light, noise, pyramid.at(node.window.frame.factor), &camera, pose);
+        Reference::of(&prepared.nodes.iter().map(window).collect::<Vec<_>>())
+    };
+    let references = photos.iter().zip(&poses).map(reference).collect();
     let model = model.digest();
-    Ok(Calibration { format: FORMAT, model, installation, lamps: weights, noise, poses, score, correlation })
+    Ok(Calibration {
+        format: FORMAT,
+        model,
+        installation,
+        lamps: weights,
+        noise,
+        poses,
+        score,
+        correlation,
+        references,
+    })
 }
 
 /// The camera as it hangs, from where the assemblies are found.

@@ -87,8 +87,37 @@ impl Density {
         Density { mean, columns, precision, factor, log_norm: (log_precision - log_det) / 2.0 }
     }
 
-    pub fn mean(&self) -> &[f32] {
-        &self.mean
+    /// What a real sample has and neither mean nor nuisances know.
+    pub fn gap(&self, z: &[f32]) -> Vec<f32> {
+        let a = self.nuisances(z);
+        let mut rest: Vec<f32> = z.iter().zip(&self.mean).map(|(z, m)| z - m).collect();
+        for (column, &weight) in self.columns.iter().zip(&a) {
+            rest.iter_mut().zip(column).for_each(|(r, &w)| *r -= w * weight as f32);
+        }
+        rest
+    }
+
+    /// How much of each coefficient two densities have in common (0..1): 1 where their means agree within the noise.
+    pub fn shared(&self, other: &Density) -> Vec<f32> {
+        let pair = |k: usize| {
+            let apart = self.mean[k] - other.mean[k];
+            1.0 / (1.0 + apart * apart * self.precision[k].min(other.precision[k]))
+        };
+        (0..self.mean.len()).map(pair).collect()
+    }
+
+    /// Moves towards real samples by their gaps where `share` (0..1 per coefficient) lets it: half the way with one sample,
+    /// all the way with many, and what is left becomes a nuisance. One sample cannot tell what is this station's from
+    /// what is that assembly's.
+    pub fn adapt(&mut self, gaps: &[Vec<f32>], share: &[f32]) {
+        let part = 1.0 / (gaps.len() + 1) as f32;
+        for gap in gaps {
+            self.mean.iter_mut().zip(gap).zip(share).for_each(|((m, g), s)| *m += g * s * part);
+        }
+        let column = |gap: &Vec<f32>| gap.iter().zip(share).map(|(g, s)| g * s * part.sqrt()).collect();
+        let columns = std::mem::take(&mut self.columns).into_iter().chain(gaps.iter().map(column)).collect();
+        let (mean, precision) = (std::mem::take(&mut self.mean), std::mem::take(&mut self.precision));
+        *self = Density::assemble(mean, columns, precision);
     }
 
     /// Log density under Gaussian noise, up to the constant all hypotheses share: fast, for the search over shifts.
@@ -101,16 +130,22 @@ impl Density {
 
     /// Log density under Student-t noise: nuisances at their robust maximum, integrated by Laplace's method.
     pub fn student(&self, z: &[f32]) -> f64 {
+        let a = self.nuisances(z);
+        let rest = self.residual(z, &a);
+        let noise: f64 = rest.iter().map(|&r| (1.0 + f64::from(r * r) / STUDENT).ln()).sum();
+        let prior: f64 = a.iter().map(|v| v * v).sum();
+        self.log_norm - (STUDENT + 1.0) / 2.0 * noise - prior / 2.0
+    }
+
+    /// The nuisances' robust maximum.
+    fn nuisances(&self, z: &[f32]) -> Vec<f64> {
         const ROUNDS: usize = 2;
         let (_, b) = self.project(z);
         let mut a = linear::solve_with(&self.factor, &b);
         for _ in 0..ROUNDS {
             a = self.reweighted(z, &a);
         }
-        let rest = self.residual(z, &a);
-        let noise: f64 = rest.iter().map(|&r| (1.0 + f64::from(r * r) / STUDENT).ln()).sum();
-        let prior: f64 = a.iter().map(|v| v * v).sum();
-        self.log_norm - (STUDENT + 1.0) / 2.0 * noise - prior / 2.0
+        a
     }
 
     /// Residual in standard deviations after taking the nuisances off.
@@ -283,6 +318,33 @@ mod tests {
         let usual = density.student(&with(1.6, 31));
         assert!(usual > density.student(&with(0.0, 32)) - 0.2 * n as f64);
         assert!(usual > density.student(&strange) + 0.5 * n as f64);
+    }
+
+    #[test]
+    fn what_a_real_sample_adds_is_forgiven_where_hypotheses_agree() {
+        let n = 60;
+        let step =
+            |from: usize, to: usize, v: f32| (0..n).map(|k| if (from..to).contains(&k) { v } else { 0.0 }).collect();
+        let draws = |mean: &Vec<f32>, seed: u64| -> Vec<Vec<f32>> {
+            let draw = |i| noise(n, seed + i).iter().zip(mean).map(|(e, m)| m + 0.1 * e).collect();
+            (0..9).map(draw).collect()
+        };
+        let (part, hole): (Vec<f32>, Vec<f32>) = (step(0, 20, 1.0), step(0, 20, -1.0));
+        let fit = |mean, seed| Density::fit(&draws(mean, seed), Vec::new(), &one_level(n));
+        let (mut good, mut missing) = (fit(&part, 100), fit(&hole, 200));
+        // The real surroundings have an edge that no render has, and the real part is brighter than rendered.
+        let edge: Vec<f32> = step(40, 50, 2.0);
+        let real: Vec<f32> = (0..n).map(|k| part[k] * 1.5 + edge[k]).collect();
+        let empty: Vec<f32> = (0..n).map(|k| hole[k] + edge[k]).collect();
+        let before = [&real, &empty].map(|z| [good.student(z), missing.student(z)]);
+        let gap = vec![good.gap(&real)];
+        let shares = [good.shared(&good), missing.shared(&good)];
+        good.adapt(&gap, &shares[0]);
+        missing.adapt(&gap, &shares[1]);
+        let after = [&real, &empty].map(|z| [good.student(z), missing.student(z)]);
+        assert!(after[0][0] > before[0][0] + 20.0 && after[1][1] > before[1][1] + 20.0, "{before:?} {after:?}");
+        assert!(after[0][0] > after[0][1] && after[1][1] > after[1][0]);
+        assert!(shares[0].iter().all(|&s| s == 1.0) && shares[1][5] < 0.1 && shares[1][45] > 0.8);
     }
 
     #[test]

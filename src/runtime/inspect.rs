@@ -7,7 +7,8 @@
 use super::calibrate::{Calibration, widened};
 use super::camera::Camera;
 use super::density::Density;
-use super::judge::{Evidence, Prepared, fit_lamps};
+use super::judge::{Evidence, NodeImages, Prepared, Pyramid};
+use super::light::Light;
 use super::locate::{Located, Search};
 use super::model::{Model, Node};
 use super::photo::Photo;
@@ -16,10 +17,6 @@ use serde::{Deserialize, Serialize};
 
 /// A node of which less is inside the photo cannot be judged.
 const LEAST_INSIDE: f64 = 0.6;
-/// Lamps that drift by more than this share are weighed anew in every photo.
-const RELIGHT: f64 = 0.3;
-/// Weight of the calibrated light against one photo's own, where the lamps drift that much.
-const RELIGHT_PULL: f64 = 0.02;
 /// Below this share of the calibration's score the assembly counts as not found.
 const LEAST_SCORE: f64 = 0.5;
 
@@ -93,22 +90,21 @@ pub struct Inspector<'a> {
     camera: Camera,
     search: Search,
     prepared: Prepared,
+    light: Light,
     densities: Vec<Vec<Density>>,
-    relight: bool,
 }
 
 impl<'a> Inspector<'a> {
     /// `None` when the model's camera cannot see its own nodes.
     pub fn new(model: &'a Model, calibration: &'a Calibration) -> Option<Inspector<'a>> {
         let prepared = Prepared::new(model)?;
-        let drift = drifts(model);
-        let relight = drift.iter().any(|&d| d > RELIGHT);
-        let densities =
-            |weights: &[f64]| prepared.nodes.iter().map(|n| n.densities(weights, &drift, calibration.noise)).collect();
-        let densities = densities(&calibration.lamps);
+        let light = light(model, &calibration.lamps);
+        let references = |node: usize| calibration.references.iter().map(|r| r.window(node)).collect::<Vec<_>>();
+        let densities = |(i, n): (usize, &NodeImages)| n.densities(&light, calibration.noise, &references(i));
+        let densities = prepared.nodes.iter().enumerate().map(densities).collect();
         let camera = calibration.installation.apply(&model.station.camera);
         let search = Search::new(&model.locator);
-        Some(Inspector { model, calibration, camera, search, prepared, densities, relight })
+        Some(Inspector { model, calibration, camera, search, prepared, light, densities })
     }
 
     /// Judges one photo.
@@ -118,8 +114,27 @@ impl<'a> Inspector<'a> {
         let least = self.least_score();
         match located {
             Some(found) if found.score >= least => self.judge(photo, found),
-            found => not_found(found, least),
+            found => self.judge_without(photo, least).unwrap_or_else(|| not_found(found, least)),
         }
+    }
+
+    /// The verdict on an assembly that is found only when the edges of one component are not looked for, if that
+    /// component proves to be at fault. Never a go.
+    fn judge_without(&self, photo: &Photo, least: f64) -> Option<Verdict> {
+        let locator = &self.model.locator;
+        if locator.unsigned || locator.groups.len() < 2 {
+            return None;
+        }
+        let attempt = |group: usize| -> Option<Verdict> {
+            let search = Search::without(locator, Some(group));
+            let fields = search.fields(&photo.light, self.calibration.noise);
+            let found = search.locate(&fields, &self.camera, &widened(self.model))?;
+            let verdict = (found.score >= least).then(|| self.judge(photo, found))?;
+            let blamed = verdict.findings.iter().any(|f| f.component == locator.groups[group].name);
+            blamed.then_some(verdict)
+        };
+        let verdicts = (0..locator.groups.len()).filter_map(attempt);
+        verdicts.max_by(|a, b| a.locator_score.total_cmp(&b.locator_score))
     }
 
     /// Where the components themselves locate, a photo of other states than the calibration's scores lower by right.
@@ -132,7 +147,8 @@ impl<'a> Inspector<'a> {
         let evidence = self.evidence(photo, &found.pose);
         let mut nodes: Vec<NodeReport> =
             (0..evidence.len()).map(|i| self.report(i, &evidence[i], &found.pose)).collect();
-        let order = self.blame(&mut nodes, &evidence);
+        let disturbed = self.disturbed(&nodes, photo, &found.pose);
+        let order = self.blame(&mut nodes, &evidence, &disturbed);
         let findings: Vec<Finding> = order.iter().map(|&i| self.finding(i, &nodes[i])).collect();
         let hidden = nodes.iter().find(|n| n.inside < LEAST_INSIDE);
         let (decision, reason) = match (&findings[..], hidden) {
@@ -155,47 +171,27 @@ impl<'a> Inspector<'a> {
         }
     }
 
-    /// Log-likelihoods of all nodes, under the calibrated light or, where lamps drift far, this photo's own.
+    /// Log-likelihoods of all nodes.
     pub fn evidence(&self, photo: &Photo, pose: &Pose) -> Vec<Evidence> {
         let pyramid = self.prepared.pyramid(&photo.light);
-        let own = self.relight.then(|| self.relit(&pyramid, pose));
-        let densities = own.as_ref().unwrap_or(&self.densities);
-        let of = |(node, densities): (&super::judge::NodeImages, &Vec<Density>)| {
-            node.evidence(densities, pyramid.at(node.window.frame.factor), &self.camera, pose)
-        };
-        self.prepared.nodes.iter().zip(densities).map(of).collect()
+        let own = |i: usize| self.weigh(i, &self.densities[i][..self.prepared.nodes[i].own], &pyramid, pose);
+        (0..self.prepared.nodes.len()).map(own).collect()
     }
 
-    /// Densities under this photo's light. Light and hypotheses take turns, each making the best of the other; they may
-    /// settle on a wrong pair, so they start once from all that is good and once from all that is faulty alike.
-    fn relit(&self, pyramid: &super::judge::Pyramid, pose: &Pose) -> Vec<Vec<Density>> {
-        let most = self.prepared.nodes.iter().map(|n| n.hypotheses()).max().unwrap_or(1);
-        let starts = (0..most).map(|h| self.relit_from(pyramid, pose, h));
-        let best = starts.max_by(|a, b| a.1.total_cmp(&b.1));
-        best.map_or_else(Vec::new, |(densities, _)| densities)
-    }
-
-    /// The same from one start, with the log-likelihood of the whole photo.
-    fn relit_from(&self, pyramid: &super::judge::Pyramid, pose: &Pose, start: usize) -> (Vec<Vec<Density>>, f64) {
-        const ROUNDS: usize = 2;
-        let drift = vec![0.0; self.calibration.lamps.len()];
-        let nodes = &self.prepared.nodes;
-        let mut hypotheses: Vec<usize> = nodes.iter().map(|n| start.min(n.hypotheses() - 1)).collect();
-        let (mut densities, mut total) = (Vec::new(), 0.0);
-        for _ in 0..ROUNDS {
-            let evidence = self.prepared.light_evidence(pyramid, &self.camera, pose, &hypotheses);
-            let fit = fit_lamps(&evidence, &self.calibration.lamps, RELIGHT_PULL);
-            (densities, total) = (Vec::new(), 0.0);
-            for (node, chosen) in nodes.iter().zip(&mut hypotheses) {
-                let own = node.densities(&fit.weights, &drift, self.calibration.noise);
-                let reduced = pyramid.at(node.window.frame.factor);
-                let evidence = node.evidence(&own, reduced, &self.camera, pose);
-                *chosen = best(&evidence.log_likelihoods);
-                total += evidence.log_likelihoods[*chosen];
-                densities.push(own);
-            }
+    /// Log-likelihoods of the disturbed states of the nodes that need an explanation; empty for the others.
+    fn disturbed(&self, nodes: &[NodeReport], photo: &Photo, pose: &Pose) -> Vec<Vec<f64>> {
+        let needed = |i: usize| nodes[i].faulty && !self.model.nodes[i].disturbed.is_empty();
+        if nodes.iter().filter(|n| n.faulty).count() < 2 {
+            return vec![Vec::new(); nodes.len()];
         }
-        (densities, total)
+        let pyramid = self.prepared.pyramid(&photo.light);
+        let states = |i: usize| self.weigh(i, &self.densities[i][self.prepared.nodes[i].own..], &pyramid, pose);
+        (0..nodes.len()).map(|i| if needed(i) { states(i).log_likelihoods } else { Vec::new() }).collect()
+    }
+
+    fn weigh(&self, node: usize, densities: &[Density], pyramid: &Pyramid, pose: &Pose) -> Evidence {
+        let node = &self.prepared.nodes[node];
+        node.evidence(densities, &self.light, pyramid.at(node.window.frame.factor), &self.camera, pose)
     }
 
     fn report(&self, index: usize, evidence: &Evidence, pose: &Pose) -> NodeReport {
@@ -222,7 +218,7 @@ impl<'a> Inspector<'a> {
     }
 
     /// Orders the faulty nodes by their evidence and drops those that a stronger fault explains.
-    fn blame(&self, nodes: &mut [NodeReport], evidence: &[Evidence]) -> Vec<usize> {
+    fn blame(&self, nodes: &mut [NodeReport], evidence: &[Evidence], disturbed: &[Vec<f64>]) -> Vec<usize> {
         let mut faulty: Vec<usize> = (0..nodes.len()).filter(|&i| nodes[i].faulty).collect();
         let against = |i: usize| -> f64 {
             let l = &evidence[i].log_likelihoods;
@@ -231,13 +227,26 @@ impl<'a> Inspector<'a> {
         faulty.sort_by(|&a, &b| against(a).total_cmp(&against(b)).then(a.cmp(&b)));
         let mut blamed: Vec<usize> = Vec::new();
         for i in faulty {
-            let explained = blamed.iter().any(|&b| self.model.nodes[b].disturbs.contains(&(i as u32)));
+            let by = |&b: &usize| self.explains(b, &nodes[b].best_fault, i, &evidence[i], &disturbed[i]);
+            let explained = blamed.iter().any(by);
             nodes[i].explained = explained;
             if !explained {
                 blamed.push(i);
             }
         }
         blamed
+    }
+
+    /// Whether a fault of one node explains what another shows: it covers most of it, or the other looks rather like its
+    /// own good state beside that fault than like any fault of its own.
+    fn explains(&self, blamed: usize, fault: &str, node: usize, evidence: &Evidence, disturbed: &[f64]) -> bool {
+        if self.model.nodes[blamed].disturbs.contains(&(node as u32)) {
+            return true;
+        }
+        let states = self.model.nodes[node].disturbed.iter().zip(disturbed);
+        let beside = states.filter(|(d, _)| d.by as usize == blamed && d.fault == fault).map(|(_, l)| *l);
+        let own = evidence.log_likelihoods[1..].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        beside.fold(f64::NEG_INFINITY, f64::max) > own
     }
 
     fn finding(&self, index: usize, report: &NodeReport) -> Finding {
@@ -287,8 +296,9 @@ impl<'a> Inspector<'a> {
     }
 }
 
-fn drifts(model: &Model) -> Vec<f64> {
-    model.station.lamps.iter().map(|l| l.drift).collect()
+/// The light of a station whose lamps were calibrated to these weights.
+pub fn light(model: &Model, weights: &[f64]) -> Light {
+    Light::new(weights, &model.station.lamps)
 }
 
 /// The error mode that fits best and the log-likelihood ratio per coefficient of the good state against it.
@@ -301,10 +311,6 @@ pub fn score(evidence: &Evidence, coefficients: usize) -> (Option<usize>, f64) {
 fn against(evidence: &Evidence, coefficients: usize) -> Vec<f64> {
     let l = &evidence.log_likelihoods;
     l.iter().map(|other| (l[0] - other) / coefficients.max(1) as f64).collect()
-}
-
-fn best(log_likelihoods: &[f64]) -> usize {
-    (0..log_likelihoods.len()).max_by(|&a, &b| log_likelihoods[a].total_cmp(&log_likelihoods[b])).unwrap_or(0)
 }
 
 /// (1 + held-out goods that score no higher) / (1 + held-out goods).

@@ -76,6 +76,11 @@ pub struct Fields {
 
 impl Search {
     pub fn new(locator: &Locator) -> Search {
+        Search::without(locator, None)
+    }
+
+    /// The same without the points of one group.
+    pub fn without(locator: &Locator, skipped: Option<usize>) -> Search {
         let points = |rows: &[[i32; 6]]| rows.iter().map(EdgePoint::from_row).collect();
         let group = |g: &PointGroup| {
             g.alternatives.iter().map(|s| Alternative { coarse: points(&s.coarse), fine: points(&s.fine) }).collect()
@@ -84,7 +89,13 @@ impl Search {
             coarse_factor: locator.coarse,
             fine_factor: locator.fine,
             unsigned: locator.unsigned,
-            groups: locator.groups.iter().map(group).collect(),
+            groups: locator
+                .groups
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| Some(*i) != skipped)
+                .map(|(_, g)| group(g))
+                .collect(),
         }
     }
 

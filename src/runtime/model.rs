@@ -6,11 +6,12 @@
 
 use super::camera::Camera;
 use super::photo::Tone;
+use super::row::Row;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The format this version writes, and the only one it reads so far.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 /// Larger files are refused before they are parsed (bytes).
 const LARGEST_FILE: usize = 128 << 20;
 /// Caps on counts, far above any real station.
@@ -69,6 +70,8 @@ pub struct Install {
 #[serde(deny_unknown_fields)]
 pub struct Lamp {
     pub name: String,
+    /// The light of the station (index) that it is part of.
+    pub light: u32,
     /// Weight before calibration: photo value = sum of weight times group image.
     pub power: f64,
     /// Drift between photos: ± this share.
@@ -151,6 +154,8 @@ pub struct Node {
     pub plane: f64,
     /// px of the photo per px of the node.
     pub factor: u32,
+    /// Resolutions at which its gradients are compared, each half as fine as the one before.
+    pub levels: u32,
     /// Top left corner in the nominal photo, in node px, and size in node px.
     pub origin: [i32; 2],
     pub size: [u32; 2],
@@ -171,6 +176,20 @@ pub struct Node {
     pub fault_scores: Vec<f64>,
     /// The first is the good state.
     pub hypotheses: Vec<Hypothesis>,
+    /// What the good state looks like beside the faults of other components.
+    pub disturbed: Vec<Disturbed>,
+}
+
+/// The good state of a component while another is faulty.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Disturbed {
+    /// The node of the faulty component.
+    pub by: u32,
+    /// Its fault.
+    pub fault: String,
+    /// How this node looks then: one image per draw and light group.
+    pub images: Vec<Image>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -189,7 +208,7 @@ pub struct Hypothesis {
 pub struct Image {
     pub draw: u32,
     pub lamp: u32,
-    pub rows: Vec<Vec<u16>>,
+    pub rows: Vec<Row>,
 }
 
 /// Why a model could not be read.
@@ -250,6 +269,7 @@ impl Model {
         ensure((1..=MOST_LAMPS).contains(&self.station.lamps.len()), "no lamps, or too many")?;
         ensure(self.station.camera.size.iter().all(|s| (8..=LARGEST_IMAGE).contains(s)), "image size out of range")?;
         ensure(self.station.is_finite(), "a number of the station is not finite")?;
+        ensure(self.station.lamps.iter().all(|l| (l.light as usize) < MOST_LAMPS), "light out of range")?;
         self.locator.check(self.station.camera.size)?;
         self.nodes.iter().try_for_each(|node| node.check(self.nodes.len(), self.station.lamps.len()))
     }
@@ -296,6 +316,7 @@ impl Node {
             "node size out of range",
         )?;
         ensure((1..=1024).contains(&self.factor), "node factor out of range")?;
+        ensure((1..=12).contains(&self.levels), "node levels out of range")?;
         ensure(self.origin.iter().all(|o| o.abs() < 1 << 20), "node origin out of range")?;
         let steps = self.steps.len() == lamps && self.steps.iter().all(|s| s.is_finite() && *s > 0.0);
         ensure(self.plane.is_finite() && steps, "node numbers out of range")?;
@@ -309,25 +330,24 @@ impl Node {
             ensure(runs, "mask runs")?;
         }
         ensure(!self.hypotheses.is_empty() && self.hypotheses.len() <= 64, "number of hypotheses")?;
-        self.hypotheses.iter().try_for_each(|h| h.check(lamps, width as usize, height as usize))
+        ensure(self.disturbed.len() <= 256, "number of disturbances")?;
+        ensure(self.disturbed.iter().all(|d| (d.by as usize) < nodes), "disturbing node out of range")?;
+        let states = self.disturbed.iter().map(|d| &d.images);
+        let mut all = self.hypotheses.iter().map(|h| &h.images).chain(states);
+        all.try_for_each(|images| check_images(images, lamps, width as usize, height as usize))
     }
 }
 
-impl Hypothesis {
-    /// The images are all draws of all lamps, in order.
-    fn check(&self, lamps: usize, width: usize, height: usize) -> Result<(), &'static str> {
-        ensure(
-            self.images.len().is_multiple_of(lamps) && self.images.len() >= 2 * lamps,
-            "number of images of a hypothesis",
-        )?;
-        ensure(self.images.len() <= 10_000, "too many images")?;
-        for (i, image) in self.images.iter().enumerate() {
-            let place = image.draw as usize == i / lamps && image.lamp as usize == i % lamps;
-            ensure(place, "images out of order")?;
-            ensure(image.rows.len() == height && image.rows.iter().all(|r| r.len() == width), "image size")?;
-        }
-        Ok(())
+/// The images of a state are all draws of all lamps, in order.
+fn check_images(images: &[Image], lamps: usize, width: usize, height: usize) -> Result<(), &'static str> {
+    ensure(images.len().is_multiple_of(lamps) && images.len() >= 2 * lamps, "number of images of a hypothesis")?;
+    ensure(images.len() <= 10_000, "too many images")?;
+    for (i, image) in images.iter().enumerate() {
+        let place = image.draw as usize == i / lamps && image.lamp as usize == i % lamps;
+        ensure(place, "images out of order")?;
+        ensure(image.rows.len() == height && image.rows.iter().all(|r| r.0.len() == width), "image size")?;
     }
+    Ok(())
 }
 
 fn ensure(holds: bool, otherwise: &'static str) -> Result<(), &'static str> {
@@ -392,7 +412,7 @@ pub(crate) mod tests {
         let images = |fault: &str| Hypothesis {
             fault: fault.into(),
             sweep: String::new(),
-            images: (0..3).map(|draw| Image { draw, lamp: 0, rows: vec![vec![7, 8, 9, 10]; 4] }).collect(),
+            images: (0..3).map(|draw| Image { draw, lamp: 0, rows: vec![Row(vec![7, 8, 9, 10]); 4] }).collect(),
         };
         let rate = Rate { events: 0, trials: 10, upper_95: 0.3085 };
         let points = PointSet { fault: "good".into(), coarse: vec![[1, 2, 3, 4, 5, 6]], fine: vec![] };
@@ -409,7 +429,7 @@ pub(crate) mod tests {
                 install: Install { position_mm: 1.0, angle_rad: 0.01, focal_share: 0.005, k1: [0.0, 0.0] },
                 standing: [[-1.0, 1.0], [-1.0, 1.0], [0.0, 0.0], [0.0, 0.0]],
                 noise: 0.01,
-                lamps: vec![Lamp { name: "key".into(), power: 1.0, drift: 0.15 }],
+                lamps: vec![Lamp { name: "key".into(), light: 0, power: 1.0, drift: 0.15 }],
                 least_correlation: 0.4,
             },
             promise: Promise { false_reject_asked: 0.01, false_reject: rate, escape: rate, modes: vec![] },
@@ -426,6 +446,7 @@ pub(crate) mod tests {
                 level: 1,
                 plane: 0.0,
                 factor: 1,
+                levels: 2,
                 origin: [4, 4],
                 size: [4, 4],
                 visible: [5.0, 5.0, 7.0, 7.0],
@@ -437,6 +458,7 @@ pub(crate) mod tests {
                 good_scores: vec![],
                 fault_scores: vec![],
                 hypotheses: vec![images("good"), images("missing")],
+                disturbed: vec![Disturbed { by: 0, fault: "missing".into(), images: images("missing").images }],
             }],
         }
     }
@@ -447,7 +469,7 @@ pub(crate) mod tests {
         let text = model.write();
         assert_eq!(Model::read(&text).unwrap(), model);
         assert_eq!(text, Model::read(&text).unwrap().write());
-        assert_eq!(text.lines().filter(|l| l.trim() == "[7, 8, 9, 10],").count(), 24, "{text}");
+        assert_eq!(text.lines().filter(|l| l.trim() == "\"UOOO\",").count(), 36, "{text}");
     }
 
     #[test]
@@ -456,16 +478,16 @@ pub(crate) mod tests {
         for end in (0..text.len()).step_by(37) {
             assert!(Model::read(&text[..end]).is_err(), "cut at {end}");
         }
-        let edited = text.replacen("7, 8", "7, 9", 1);
+        let edited = text.replacen("UOOO", "UPNO", 1);
         assert!(matches!(Model::read(&edited), Err(ModelError::Digest { .. })));
     }
 
     #[test]
     fn other_formats_are_named() {
-        let newer = tiny().write().replacen("format: 1", "format: 9", 1);
+        let newer = tiny().write().replacen("format: 2", "format: 9", 1);
         assert_eq!(Model::read(&newer), Err(ModelError::Newer { format: 9 }));
         assert!(Model::read(&newer).unwrap_err().to_string().contains("E0801"));
-        let older = tiny().write().replacen("format: 1", "format: 0", 1);
+        let older = tiny().write().replacen("format: 2", "format: 0", 1);
         assert_eq!(Model::read(&older), Err(ModelError::Older { format: 0 }));
     }
 

@@ -9,9 +9,11 @@ use crate::design::model::Design;
 use crate::runtime::camera::{Camera, Vec3};
 use crate::runtime::grid::Grid;
 use crate::runtime::judge::NodeImages;
+use crate::runtime::light::Light;
 use crate::runtime::locate::EdgePoint;
-use crate::runtime::model::{Hypothesis, Image, Locator, Node, PointGroup, PointSet};
+use crate::runtime::model::{Disturbed, Hypothesis, Image, Lamp, Locator, Node, PointGroup, PointSet};
 use crate::runtime::pose::Pose;
+use crate::runtime::row::Row;
 use crate::runtime::window::{Window, runs_of};
 use crate::view::item_buffer::Mask;
 use crate::view::nodes::dilate;
@@ -42,11 +44,13 @@ pub struct Context<'a> {
     pub shots: &'a Shots,
     /// Lamp powers before calibration, in photo units.
     pub powers: &'a [f64],
-    pub drift: &'a [f64],
+    pub lamps: &'a [Lamp],
 }
 
 /// The draws of one hypothesis: shots with the shift of the node in each (node px).
 struct Sample<'a> {
+    /// The node whose fault it is, if not this one's own.
+    by: Option<u32>,
     fault: &'static str,
     sweep: String,
     shots: Vec<&'a Shot>,
@@ -66,16 +70,26 @@ pub fn node(context: &Context, plan: &NodePlan) -> Option<Node> {
     Some(node)
 }
 
-/// The good state and every mode, long sweeps in pieces.
+/// The good state, every mode, and the good state beside the faults of others; long sweeps in pieces.
 fn samples<'a>(context: &'a Context, plan: &NodePlan) -> Vec<Sample<'a>> {
-    let sample =
-        |fault, sweep, shots: Vec<&'a Shot>| Sample { fault, sweep, shifts: vec![[0.0; 2]; shots.len()], shots };
+    let sample = |fault, sweep, shots: Vec<&'a Shot>| Sample {
+        by: None,
+        fault,
+        sweep,
+        shifts: vec![[0.0; 2]; shots.len()],
+        shots,
+    };
     let mut out = vec![sample("good", String::new(), context.shots.good.iter().collect())];
     for &m in &plan.modes {
         let mode = &context.modes[m];
         for (low, high, shots) in pieces(context, m) {
             out.push(sample(mode.kind.word(), sweep(&mode.motion, low, high), shots));
         }
+    }
+    for &(by, m) in &plan.disturbed {
+        let mode = &context.modes[m];
+        let shots = pieces(context, m).into_iter().flat_map(|(_, _, shots)| shots).collect();
+        out.push(Sample { by: Some(by), ..sample(mode.kind.word(), sweep(&mode.motion, 0.0, 1.0), shots) });
     }
     out
 }
@@ -118,11 +132,15 @@ impl Cutter<'_> {
     fn node(&self, samples: &[Sample]) -> Node {
         let cut: Vec<Vec<Vec<Grid>>> = samples.iter().map(|s| self.images(s)).collect();
         let steps: Vec<f64> = (0..self.context.powers.len()).map(|lamp| step(&cut, lamp)).collect();
-        let hypothesis = |(sample, draws): (&Sample, &Vec<Vec<Grid>>)| Hypothesis {
-            fault: sample.fault.into(),
-            sweep: sample.sweep.clone(),
-            images: quantised(draws, &steps),
-        };
+        let (mut hypotheses, mut disturbed) = (Vec::new(), Vec::new());
+        for (sample, draws) in samples.iter().zip(&cut) {
+            let images = quantised(draws, &steps);
+            let fault = sample.fault.into();
+            match sample.by {
+                None => hypotheses.push(Hypothesis { fault, sweep: sample.sweep.clone(), images }),
+                Some(by) => disturbed.push(Disturbed { by, fault, images }),
+            }
+        }
         let (plan, frame) = (self.plan, self.plan.frame);
         Node {
             name: self.context.design.components[plan.component].name.clone(),
@@ -130,16 +148,18 @@ impl Cutter<'_> {
             level: 1,
             plane: frame.plane,
             factor: frame.factor,
+            levels: self.context.design.train.levels,
             origin: frame.origin,
             size: frame.size,
             visible: plan.visible,
             mask: runs_of(&plan.mask),
-            spread: [plan.spread; 2],
+            spread: plan.spread,
             disturbs: plan.disturbs.clone(),
             threshold: 0.0,
             good_scores: Vec::new(),
             fault_scores: Vec::new(),
-            hypotheses: samples.iter().zip(&cut).map(hypothesis).collect(),
+            hypotheses,
+            disturbed,
             steps,
         }
     }
@@ -158,13 +178,14 @@ impl Cutter<'_> {
     fn align(&self, node: &Node, samples: &mut [Sample]) -> Option<()> {
         let context = self.context;
         let images = NodeImages::new(node, context.camera, &context.home, context.powers.len())?;
-        let densities = images.densities(context.powers, context.drift, ALIGN_NOISE);
+        let powers = Light::new(context.powers, context.lamps);
+        let densities = images.densities(&powers, ALIGN_NOISE, &[]);
         let factor = (self.plan.frame.factor / context.plan.base) as usize;
         for (sample, density) in samples.iter_mut().zip(&densities) {
             for (shot, shift) in sample.shots.iter().zip(&mut sample.shifts) {
                 let mut light = shot.lit(context.powers).reduced(factor);
                 light.values.iter_mut().for_each(|v| *v = v.min(1.0));
-                *shift = images.best_shift(density, &light, context.camera, &shot.pose);
+                *shift = images.best_shift(density, &powers, &light, context.camera, &shot.pose);
             }
         }
         Some(())
@@ -180,8 +201,8 @@ fn step(cut: &[Vec<Vec<Grid>>], lamp: usize) -> f64 {
 }
 
 fn quantised(draws: &[Vec<Grid>], steps: &[f64]) -> Vec<Image> {
-    let row = |row: &[f32], step: f64| -> Vec<u16> {
-        row.iter().map(|&v| (f64::from(v) / step).round().clamp(0.0, f64::from(u16::MAX)) as u16).collect()
+    let row = |row: &[f32], step: f64| -> Row {
+        Row(row.iter().map(|&v| (f64::from(v) / step).round().clamp(0.0, f64::from(u16::MAX)) as u16).collect())
     };
     let mut out = Vec::new();
     for (draw, lamps) in draws.iter().enumerate() {
@@ -202,12 +223,29 @@ pub fn locator(context: &Context, datum: &[bool]) -> Locator {
     let on_datum = |x: usize, y: usize| datum[component_near(context, x, y)?].then_some(());
     let found = points(context, &good, "good", &on_datum, 1.0, None, false);
     let unsigned = found.fine.len() < ENOUGH_DATUM_POINTS;
-    let mut groups = vec![PointGroup { name: "datum".into(), alternatives: vec![found] }];
-    if unsigned {
-        groups = plan.nodes.iter().map(|node| component_group(context, node)).collect();
-    }
+    let mut groups = if unsigned {
+        plan.nodes.iter().map(|node| component_group(context, node)).collect()
+    } else {
+        by_component(context, &found)
+    };
     groups.retain(|g| g.alternatives.iter().any(|a| !a.fine.is_empty()));
     Locator { coarse: plan.base * 2, fine: plan.base, unsigned, groups, accept: 0.0 }
+}
+
+/// Points of the good state, a group per component they lie on: where one is missing, the others still tell the place.
+fn by_component(context: &Context, all: &PointSet) -> Vec<PointGroup> {
+    let camera = context.camera.reduced(context.plan.base);
+    let component = |row: &[i32; 6]| -> Option<usize> {
+        let at = [0, 1, 2].map(|i| f64::from(row[i]) * 1e-3);
+        let [x, y] = camera.project(context.home.apply(at))?.map(|v| v.round().max(0.0) as usize);
+        component_near(context, x, y)
+    };
+    let of = |rows: &[[i32; 6]], c: usize| rows.iter().copied().filter(|row| component(row) == Some(c)).collect();
+    let group = |c: usize| {
+        let points = PointSet { fault: all.fault.clone(), coarse: of(&all.coarse, c), fine: of(&all.fine, c) };
+        PointGroup { name: context.design.components[c].name.clone(), alternatives: vec![points] }
+    };
+    (0..context.design.components.len()).map(group).collect()
 }
 
 /// A component's edges in its good state and where it is missing.

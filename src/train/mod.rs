@@ -145,8 +145,10 @@ fn fit_model(job: &Job, plan: &Plan, shots: &Shots) -> Model {
     let drift: Vec<f64> = lights.iter().map(|&l| job.station.lights[l].drift).collect();
     let scale = exposure(plan, shots, &described);
     let powers: Vec<f64> = described.iter().map(|p| p * scale).collect();
-    let lamp = |i: usize| Lamp { name: names[i].name.clone(), power: powers[i], drift: drift[i] };
-    let station = station(job, (0..powers.len()).map(lamp).collect());
+    let lamp =
+        |i: usize| Lamp { name: names[i].name.clone(), light: lights[i] as u32, power: powers[i], drift: drift[i] };
+    let lamps: Vec<Lamp> = (0..powers.len()).map(lamp).collect();
+    let station = station(job, lamps.clone());
     let home = Pose::home(&station);
     let context = Context {
         design: job.design,
@@ -156,7 +158,7 @@ fn fit_model(job: &Job, plan: &Plan, shots: &Shots) -> Model {
         modes: job.modes,
         shots,
         powers: &powers,
-        drift: &drift,
+        lamps: &lamps,
     };
     let mut nodes: Vec<Node> = plan.nodes.par_iter().filter_map(|node| fit::node(&context, node)).collect();
     hang(&mut nodes, job.design, job.tree);

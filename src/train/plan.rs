@@ -6,12 +6,13 @@
 
 use super::shots::Drawn;
 use crate::assembly::fault::ErrorMode;
-use crate::design::model::{Component, Design, Expr};
+use crate::design::model::{Design, Expr};
 use crate::runtime::camera::Camera;
 use crate::runtime::window::Frame;
 use crate::scene::build::bodies;
 use crate::view::item_buffer::{ItemBuffer, Mask, PixelBox};
 use crate::view::nodes::{change_mask, dilate};
+use nalgebra::Vector3;
 
 /// Places in a sweep at which the change of the image is looked at.
 const LOOKS: [f64; 3] = [0.05, 0.5, 0.95];
@@ -23,6 +24,8 @@ const LEAST_PIXELS: usize = 8;
 const MOST_NODE_PIXELS: u32 = 3000;
 /// A component disturbs a node when its own change covers this share of the node's.
 const DISTURBS: f64 = 0.3;
+/// A fault shows in another's node when its change covers this share of the node's.
+const TOUCHES: f64 = 0.03;
 /// Standard deviation of a node's shift when its placement is exact (px of the photo): what pose and camera leave.
 const POSE_RESIDUAL: f64 = 1.0;
 /// The smallest watched component should have this many px of the shots across.
@@ -42,10 +45,12 @@ pub struct NodePlan {
     pub modes: Vec<usize>,
     /// Where the image changes under any of them (px of the shots).
     pub changed: Mask,
-    /// Standard deviation of the node's shift (px of the photo).
-    pub spread: f64,
+    /// Standard deviation of the node's shift along x and y of the photo (px).
+    pub spread: [f64; 2],
     /// Nodes whose image this one's faults disturb.
     pub disturbs: Vec<u32>,
+    /// Nodes and error modes of other components that change what this node shows in its good state.
+    pub disturbed: Vec<(u32, usize)>,
 }
 
 pub struct Plan {
@@ -81,6 +86,7 @@ pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, modes: &[ErrorMod
         .collect();
     link(&mut nodes);
     let scenes = gather(modes, &changes);
+    disturb(&mut nodes, &scenes, &changes);
     Plan { base, good: view.good, nodes, scenes, unseen }
 }
 
@@ -142,8 +148,18 @@ fn node(
     let (frame, mask) = framed(&wide, &area, base, factor, plane(view, component, &changed));
     let shown = view.good.bbox(component).or_else(|| changed.bbox())?;
     let visible = [shown.x0, shown.y0, shown.x1, shown.y1].map(|v| f64::from(v * base));
-    let spread = spread(&design.components[component], design, camera);
-    Some(NodePlan { component, frame, mask, visible, modes, changed, spread, disturbs: Vec::new() })
+    let spread = spread(component, design, camera, view.drawn);
+    Some(NodePlan {
+        component,
+        frame,
+        mask,
+        visible,
+        modes,
+        changed,
+        spread,
+        disturbs: Vec::new(),
+        disturbed: Vec::new(),
+    })
 }
 
 /// px of the photo per px of the node.
@@ -189,16 +205,33 @@ fn plane(view: &View, component: usize, changed: &Mask) -> f64 {
     all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Standard deviation of the component's place in the photo (px): its zone along x, y and z as seen, and what the pose leaves.
-fn spread(component: &Component, design: &Design, camera: &Camera) -> f64 {
-    let distance = camera.position.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let zone = |axis: &Expr| match axis {
+/// Standard deviation of the component's place in the photo (px): its zone along x, y and z as seen, its parents' too,
+/// and what the pose leaves.
+fn spread(component: usize, design: &Design, camera: &Camera, drawn: &Drawn) -> [f64; 2] {
+    let values = design.nominal();
+    let at = drawn.poses[component].translation.vector;
+    let seen = |by: Vector3<f64>| camera.project(drawn.standing.apply((at + by).into()));
+    let mut variance = [POSE_RESIDUAL * POSE_RESIDUAL; 2];
+    for index in std::iter::successors(Some(component), |&i| design.components[i].parent) {
+        let placed = &design.components[index].pose;
+        // The axes of a zone are those of the frame on which the component is placed.
+        let frame = drawn.poses[index].rotation * placed.eval(&values).rotation.inverse();
+        for (axis, half) in placed.t.iter().map(|axis| half_zone(axis, design)).enumerate() {
+            let by = frame * Vector3::ith(axis, half);
+            if let (Some(a), Some(b)) = (seen(-by), seen(by)) {
+                // A uniform error within ± h has the variance h² / 3.
+                (0..2).for_each(|k| variance[k] += ((b[k] - a[k]) / 2.0).powi(2) / 3.0);
+            }
+        }
+    }
+    variance.map(f64::sqrt)
+}
+
+fn half_zone(axis: &Expr, design: &Design) -> f64 {
+    match axis {
         Expr::Dim(id) => design.dims[id.0 as usize].range.half_width(),
         _ => 0.0,
-    };
-    let per_mm = camera.focal / distance;
-    let variance: f64 = component.pose.t.iter().map(|axis| (zone(axis) * per_mm).powi(2) / 3.0).sum();
-    (variance + POSE_RESIDUAL * POSE_RESIDUAL).sqrt()
+    }
 }
 
 /// Notes which nodes lie where another's faults change the image.
@@ -211,6 +244,30 @@ fn link(nodes: &mut [NodePlan]) {
         let disturbed = (0..nodes.len()).filter(|&j| j != i && covers(&nodes[i], &nodes[j]));
         nodes[i].disturbs = disturbed.map(|j| j as u32).collect();
     }
+}
+
+/// Notes which error modes of other components show in a node, where a scene shows them alone.
+fn disturb(nodes: &mut [NodePlan], scenes: &[Vec<usize>], changes: &[Option<Mask>]) {
+    let mut found = vec![Vec::new(); nodes.len()];
+    for (index, node) in nodes.iter().enumerate() {
+        let least = (TOUCHES * node.changed.count() as f64).max(LEAST_PIXELS as f64);
+        let touches = |m: usize| {
+            let change = changes[m].as_ref();
+            change.is_some_and(|c| {
+                c.bits.iter().zip(&node.changed.bits).filter(|(a, b)| **a && **b).count() as f64 >= least
+            })
+        };
+        for scene in scenes {
+            let touching: Vec<usize> = scene.iter().copied().filter(|&m| touches(m)).collect();
+            if let [alone] = touching[..] {
+                let by = nodes.iter().position(|other| other.modes.contains(&alone)).filter(|&by| by != index);
+                // What is covered for the most part is explained without being looked at.
+                let by = by.filter(|&by| !nodes[by].disturbs.contains(&(index as u32)));
+                found[index].extend(by.map(|by| (by as u32, alone)));
+            }
+        }
+    }
+    nodes.iter_mut().zip(found).for_each(|(node, disturbed)| node.disturbed = disturbed);
 }
 
 /// Puts every visible mode into the first scene in which no other change comes near.

@@ -3,7 +3,7 @@
 //! In: a design, a station, the number of a draw and the faults to show. Out: [`Shot`]s, all of one draw of dimensions,
 //! finishes and standing pose, so that a faulty shot differs from the good one by the fault alone.
 
-use crate::assembly::fault::{self, ErrorMode};
+use crate::assembly::fault::{self, ErrorMode, Motion};
 use crate::assembly::place::place;
 use crate::design::model::{Design, Station};
 use crate::diag::Diagnostic;
@@ -91,6 +91,9 @@ impl Drawn {
             }
             if let Some(other) = faulted.solid {
                 instance.solids[mode.component] = Some(other);
+            }
+            if let Motion::Replace { by, .. } = mode.motion {
+                instance.finishes[mode.component] = self.finishes[by].clone();
             }
             for (component, pose) in faulted.pushed {
                 instance.poses[component] = pose;

@@ -3,6 +3,7 @@
 //! In: a trained model, fresh shots. Out: thresholds, scores and the promise that the model file makes. The station is
 //! imagined installed with an error, lit by lamps of other powers, and calibrated with one photo, as a customer would.
 
+use super::edges;
 use super::plan::Plan;
 use super::stats::{normal_quantile, rate, rounded};
 use super::synthesise::{FaultyShot, Shots};
@@ -11,8 +12,9 @@ use crate::design::model::Design;
 use crate::rng::Stream;
 use crate::runtime::calibrate::{self, Calibration};
 use crate::runtime::grid::Grid;
-use crate::runtime::inspect::{Inspector, Verdict};
-use crate::runtime::model::{ModeRate, Model, Promise};
+use crate::runtime::inspect::{self, Inspector, Verdict};
+use crate::runtime::light::{range, within};
+use crate::runtime::model::{Lamp, ModeRate, Model, Promise};
 use crate::runtime::photo::Photo;
 use crate::runtime::pose::Installation;
 
@@ -20,6 +22,8 @@ use crate::runtime::pose::Installation;
 const LAMP_POWERS: [f64; 2] = [0.3, 1.7];
 /// Grey value (share of full scale) that bright matt surfaces reach in a well exposed photo: least and most.
 const EXPOSURES: [f64; 2] = [0.35, 0.75];
+/// Share of a photo's pixels that are darker than those that the exposure goes by.
+const EXPOSED_QUANTILE: f64 = 0.95;
 /// Share of the held-out goods' lowest locator score below which an assembly counts as not found.
 const ACCEPT_SHARE: f64 = 0.5;
 
@@ -59,18 +63,28 @@ pub fn customer(model: &Model, index: u64) -> Customer {
     Customer { installation, powers, noise: model.station.noise.max(0.002), seed: stream.bits() }
 }
 
-/// A photo: lamps drift, the sensor adds its noise, clips and rounds to 8 bits.
+/// A photo: lamps drift, the sensor adds its noise, clips and rounds to 8 bits. Where the light is open the camera exposes
+/// by itself.
 pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, index: u64) -> Photo {
     let mut stream = Stream::new(customer.seed, "photo", index);
-    let drifted: Vec<f64> = customer
-        .powers
-        .iter()
-        .zip(&model.station.lamps)
-        .map(|(p, lamp)| (p * (1.0 + stream.between(-lamp.drift, lamp.drift))).max(0.0))
-        .collect();
+    let open = inspect::light(model, &customer.powers).is_open();
+    let mut drifted = |(&power, lamp): (&f64, &Lamp)| {
+        let u = stream.uniform();
+        if open {
+            within(&range(power, lamp.drift), u)
+        } else {
+            (power * (1.0 + lamp.drift * (2.0 * u - 1.0))).max(0.0)
+        }
+    };
+    let weights: Vec<f64> = customer.powers.iter().zip(&model.station.lamps).map(&mut drifted).collect();
     let mut light = Grid::filled(lamps[0].width, lamps[0].height, 0.0);
-    for (lamp, &weight) in lamps.iter().zip(&drifted) {
+    for (lamp, &weight) in lamps.iter().zip(&weights) {
         light.values.iter_mut().zip(&lamp.values).for_each(|(s, v)| *s += v * weight as f32);
+    }
+    if open {
+        let bright = edges::quantile(&light, |_| true, EXPOSED_QUANTILE).max(f32::MIN_POSITIVE);
+        let gain = stream.between(EXPOSURES[0], EXPOSURES[1]) as f32 / bright;
+        light.values.iter_mut().for_each(|v| *v *= gain);
     }
     let [width, height] = model.station.camera.size.map(|s| s as usize);
     let mut values = Vec::with_capacity(width * height);
