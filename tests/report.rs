@@ -22,13 +22,35 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// Runs the program in a folder.
+#[track_caller]
+fn gonogo(folder: &Path, args: &[&str]) {
+    let output = Command::new(env!("CARGO_BIN_EXE_gonogo")).args(args).current_dir(folder).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
 /// The page of a spec, written by the program itself.
 fn page(spec: &Path, folder: &Path) -> PathBuf {
-    let page = folder.join("report.html");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gonogo"));
-    let output = command.arg("report").arg(spec).arg("-o").arg(&page).output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    page
+    gonogo(folder, &["report", spec.to_str().unwrap(), "-o", "report.html"]);
+    folder.join("report.html")
+}
+
+/// A file name that would be markup, were it not escaped.
+const SPITE: &str = "a\"><img src=x onerror=document.title='broken'>.png";
+
+/// The page of the small plate with its model, a good photo, a faulty one and rubbish.
+fn judged(folder: &Path) -> PathBuf {
+    fs::copy(root().join("tests/data/two_pins.gng"), folder.join("plate.gng")).unwrap();
+    gonogo(folder, &["compile", "plate.gng", "--emit", "images,model"]);
+    let images = folder.join("plate.images");
+    fs::rename(images.join("good.png"), folder.join("good.png")).unwrap();
+    fs::rename(images.join("01 pin[1] missing.png"), folder.join(SPITE)).unwrap();
+    fs::write(folder.join("rubbish.png"), "not an image").unwrap();
+    gonogo(folder, &["calibrate", "plate.model.ron", "good.png", "-o", "plate.calibration.ron"]);
+    let model = ["--model", "plate.model.ron", "--calibration", "plate.calibration.ron"];
+    let photos = ["good.png", SPITE, "rubbish.png"];
+    gonogo(folder, &[&["report", "plate.gng", "-o", "report.html"], &model[..], &photos].concat());
+    folder.join("report.html")
 }
 
 /// The browser, or `None` where there is none and none has to be.
@@ -39,7 +61,8 @@ fn browser() -> Option<&'static str> {
     };
     let found = BROWSERS.into_iter().find(there);
     if found.is_none() {
-        assert!(std::env::var("CI").is_err(), "CI needs a Chromium: apt-get install chromium");
+        let in_ci = std::env::var_os("CI").is_some_and(|v| !v.is_empty());
+        assert!(!in_ci, "CI needs a Chromium: apt-get install chromium");
         eprintln!("SKIPPED: no Chromium here (apt-get install chromium)");
     }
     found
@@ -248,6 +271,37 @@ fn a_person_turns_explodes_and_clicks() {
     tab.mouse("mouseReleased", [at[0] + 60.0, at[1] + 10.0], 0);
     tab.settle();
     assert_ne!(tab.picture().1, before, "dragging does not turn it");
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn photos_and_promises_can_be_looked_at() {
+    let Some(name) = browser() else { return };
+    let folder = folder("report_judged");
+    let page = judged(&folder);
+    let mut tab = Tab::open(name, &folder, &page, [1280, 900]);
+    let verdicts = tab.value("[...document.querySelectorAll('.photo .verdict')].map((v) => v.textContent)");
+    assert_eq!(verdicts, json!(["go", "no-go", "cannot inspect"]));
+    assert!(!tab.text("document.title").contains("broken"));
+    let counted = |tab: &mut Tab, what: &str| tab.value(&format!("document.querySelectorAll({}).length", json!(what)));
+    assert_eq!(counted(&mut tab, "#photo-0 .drawn g.good"), json!(2));
+    assert_eq!(counted(&mut tab, "#photo-1 .drawn g.faulty path"), json!(1));
+    assert!(counted(&mut tab, "#promise svg.bar").as_u64().unwrap() > 2);
+    // Closed details hold pictures too.
+    tab.value("document.querySelectorAll('details').forEach((d) => { d.open = true; })");
+    tab.until("[...document.images].every((i) => i.complete && i.naturalWidth > 0)");
+    assert!(tab.value("document.images.length").as_u64().unwrap() >= 8);
+
+    let (_, before) = tab.picture();
+    tab.set("colours", "risk");
+    assert_ne!(tab.picture().1, before, "the chance of an escape has no colour");
+    tab.value("document.querySelector('nav button').click()");
+    let paper = tab.text("getComputedStyle(document.body).backgroundColor");
+    assert_eq!(paper, "rgb(16, 21, 28)", "the dark theme is not dark");
+
+    // Pointing at a photo's box points at the component in 3-D.
+    tab.value("document.querySelector('#photo-1 .drawn g.faulty').dispatchEvent(new MouseEvent('mouseenter'))");
+    assert_eq!(counted(&mut tab, ".parts button.on"), json!(1));
     assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 

@@ -1,20 +1,22 @@
 //! `gonogo demo`: the whole line on the pattern wheel, from its spec to verdicts on photos taken elsewhere.
 //!
-//! In: `specs/pattern_wheel.gng` and the photos beside it. Out: a table of verdicts against labels, and overlays.
+//! In: `specs/pattern_wheel.gng` and the photos beside it. Out: a table of verdicts against labels,
+//! overlays, and the report.
 
 use super::args::{Demo, Global};
 use super::compile::{self, Document};
 use super::judge;
 use super::output::{self, Failure};
+use super::report_page::{self, Judged};
 use super::verdict::{Outcome, word};
 use super::{Exit, messages};
-use crate::Options;
 use crate::artifacts::Artifact;
 use crate::diag::Diagnostic;
 use crate::runtime::calibrate;
 use crate::runtime::inspect::{Decision, Inspector};
 use crate::runtime::model::Model;
 use crate::runtime::photo::Photo;
+use crate::{Compiled, Options};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -30,21 +32,26 @@ const LABELS: &str = "labels.txt";
 pub fn demo(args: &Demo, global: &Global) -> Result<Exit, Failure> {
     let home = home()?;
     output::make_dir(&args.out)?;
-    let Some(model) = compiled(&home.join(SPEC), args, global)? else { return Ok(Exit::Faults) };
+    let compiled = compiled(&home.join(SPEC), args, global)?;
+    let Some(model) = &compiled.model else { return Ok(Exit::Faults) };
     let photos = home.join(PHOTOS);
-    let calibration = calibrated(&model, &photos.join(CALIBRATION))?;
-    let inspector = judge::inspector(&model, &calibration)?;
-    keep(args, &model, &calibration)?;
+    let calibration = calibrated(model, &photos.join(CALIBRATION))?;
+    let inspector = judge::inspector(model, &calibration)?;
+    keep(args, model, &calibration)?;
     output::line(&format!("\n{:<14} {:<36} {:<15} finding", "photo", "truth", "verdict"))?;
     let labels = labels(&photos.join(LABELS))?;
     let mut mistakes = 0;
     for label in &labels {
-        let agrees = judge_one(args, &model, &inspector, &photos, label)?;
+        let agrees = judge_one(args, model, &inspector, &photos, label)?;
         mistakes += usize::from(!agrees);
     }
     let total = labels.len();
     output::line(&format!("\n{} of {total} verdicts agree with the labels.", total - mistakes))?;
-    output::line(&format!("Model, calibration and overlays are in {}.", args.out.display()))?;
+    let judged: Vec<Judged> =
+        labels.iter().map(|l| report_page::judge_one(model, &inspector, &photos.join(&l.photo))).collect();
+    let page = report_page::page(SPEC, &compiled, Some(model), Some(&calibration), &judged);
+    output::write(&args.out.join("report.html"), page.as_bytes())?;
+    output::line(&format!("Model, calibration, overlays and report.html are in {}.", args.out.display()))?;
     Ok(if mistakes == 0 { Exit::Fine } else { Exit::Faults })
 }
 
@@ -57,20 +64,21 @@ fn home() -> Result<PathBuf, Failure> {
         .ok_or_else(|| Failure(format!("there is no {SPEC} here: run the demo in a clone of gonogo")))
 }
 
-fn compiled(spec: &Path, args: &Demo, global: &Global) -> Result<Option<Model>, Failure> {
+fn compiled(spec: &Path, args: &Demo, global: &Global) -> Result<Compiled, Failure> {
     let document = Document::read(spec)?;
     let wanted = BTreeSet::from([Artifact::Model]);
-    let options = Options { station: Some(STATION.into()), wanted, ..Options::default() };
+    let options = Options { station: Some(STATION.into()), wanted, keep: true, ..Options::default() };
     output::line(&format!("compiling {SPEC} for station {STATION} …"))?;
     let start = Instant::now();
     let compiled = args.jobs.run(|| compile::run(&document, &options, global))?;
-    let (errors, warnings): (Vec<_>, Vec<_>) = compiled.diagnostics.into_iter().partition(Diagnostic::is_error);
+    let (errors, warnings): (Vec<Diagnostic>, Vec<Diagnostic>) =
+        compiled.diagnostics.iter().cloned().partition(Diagnostic::is_error);
     messages::print(&errors, &compiled.sources, global)?;
     if !warnings.is_empty() {
         output::line(&format!("{} warnings, which `gonogo check {SPEC}` shows", warnings.len()))?;
     }
     output::line(&format!("compiled in {:.1} s, without any photo", start.elapsed().as_secs_f64()))?;
-    Ok(compiled.model)
+    Ok(compiled)
 }
 
 fn calibrated(model: &Model, path: &Path) -> Result<calibrate::Calibration, Failure> {

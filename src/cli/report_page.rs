@@ -38,8 +38,8 @@ pub fn report(args: &Report, global: &Global) -> Result<Exit, Failure> {
     Ok(if fine { Exit::Fine } else { Exit::Faults })
 }
 
-/// A photo, as people see it and as it was judged.
-struct Judged {
+/// A photo as people see it and as it was judged.
+pub struct Judged {
     name: String,
     grey: Option<GrayImage>,
     photo: Option<Photo>,
@@ -58,7 +58,7 @@ fn judged(args: &Report, model: &Model, calibration: Option<&Calibration>) -> Re
     Ok(args.photos.iter().map(|path| judge_one(model, &inspector, path)).collect())
 }
 
-fn judge_one(model: &Model, inspector: &Inspector, path: &Path) -> Judged {
+pub fn judge_one(model: &Model, inspector: &Inspector, path: &Path) -> Judged {
     let (outcome, bytes) = judge::judge(model, inspector, path);
     let bytes = bytes.unwrap_or_default();
     let station = &model.station;
@@ -70,7 +70,8 @@ fn judge_one(model: &Model, inspector: &Inspector, path: &Path) -> Judged {
     }
 }
 
-fn page(
+/// The page of what was compiled and judged.
+pub fn page(
     spec: &str,
     compiled: &Compiled,
     model: Option<&Model>,

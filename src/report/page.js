@@ -119,12 +119,15 @@
     return made;
   };
 
+  // A path that may break after its dots.
+  const path = (text) => text.split(/(?<=\.)/).flatMap((piece, i) => (i ? [document.createElement('wbr'), piece] : [piece]));
+
   function describe() {
     const { selected } = state;
     if (!selected) { about.replaceChildren(...hint); return; }
     const part = parts[selected.component], found = contactsOf(selected), lines = element('dl', []);
     const line = (term, text) => lines.append(element('dt', term), element('dd', text));
-    about.replaceChildren(element('h3', selected.face === null ? part.name : nameOf(selected)), lines);
+    about.replaceChildren(element('h3', selected.face === null ? part.name : path(nameOf(selected))), lines);
     line('Component', part.name);
     line('Part', part.part);
     line('Material', part.material);
@@ -145,7 +148,7 @@
   function row({ own, other, contact }, both) {
     const { kind, fit, area, gap, play } = contact;
     const facts = [kind, area === '0' ? '' : `${area} mm²`].filter(Boolean).join(', ');
-    const button = element('button', [element('b', nameOf(other)), ' '], 'touch');
+    const button = element('button', [element('b', path(nameOf(other))), ' '], 'touch');
     button.type = 'button';
     if (fit) button.append(element('span', fit, `fit ${fit}`));
     if (both) button.append(element('small', `by ${parts[own.component].mesh.names[own.face][0]}`));

@@ -163,7 +163,7 @@ fn details(shot: &Shot, trained: &Trained) -> String {
         }
     };
     format!(
-        "{}<details><summary>Scores of all nodes</summary><table class=\"strips\"><tbody>{rows}</tbody></table></details>\
+        "{}<details open><summary>Scores of all nodes</summary><table class=\"strips\"><tbody>{rows}</tbody></table></details>\
          {correct}",
         crops(&faulty)
     )

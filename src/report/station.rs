@@ -12,7 +12,7 @@ pub fn section(assembly: &Assembly, view: &View, report: &Report) -> String {
     let [width, height] = view.choice.camera.size;
     let buffer = ItemBuffer::of(view.bodies, &view.choice.camera.reduced(picture::reduction(view.choice.camera.size)));
     let name = |s: &Seen| escaped(&assembly.design.components[s.component].name);
-    let boxes: String = view.choice.seen.iter().map(|s| boxes(s, &name(s))).collect();
+    let boxes: String = view.choice.seen.iter().map(|s| boxes(s, &name(s), view.choice.camera.size)).collect();
     let nodes = report.model.filter(|m| m.model.station.camera.size == view.choice.camera.size).map(|m| &m.model.nodes);
     let veils: String = nodes.into_iter().flatten().map(|n| veil(assembly, n)).collect();
     let masks = if veils.is_empty() {
@@ -51,7 +51,9 @@ fn camera(view: &View) -> String {
 }
 
 /// Of the whole component and of what is seen of it, with its number.
-fn boxes(seen: &Seen, name: &str) -> String {
+fn boxes(seen: &Seen, name: &str, size: [u32; 2]) -> String {
+    /// Radius of a balloon (px), and how near its middle comes to the border.
+    const BALLOON: f64 = 9.0;
     let rect = |b: &PixelBox, class: &str| {
         format!(
             "<rect class=\"{class}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
@@ -64,9 +66,10 @@ fn boxes(seen: &Seen, name: &str) -> String {
     let full = seen.full.as_ref().map(|b| rect(b, "full")).unwrap_or_default();
     let visible = seen.visible.as_ref().map(|b| rect(b, "visible")).unwrap_or_default();
     let tag = seen.visible.as_ref().map(|b| {
-        let (x, y) = (f64::from(b.x0), f64::from(b.y0));
+        let inside = |v: u32, size: u32| f64::from(v).min(f64::from(size) - BALLOON - 1.0).max(BALLOON + 1.0);
+        let (x, y) = (inside(b.x0, size[0]), inside(b.y0, size[1]));
         format!(
-            "<g class=\"balloon visible\"><circle cx=\"{0}\" cy=\"{1}\" r=\"9\"/><text x=\"{0}\" y=\"{2}\">{3}</text></g>",
+            "<g class=\"balloon visible\"><circle cx=\"{0}\" cy=\"{1}\" r=\"{BALLOON}\"/><text x=\"{0}\" y=\"{2}\">{3}</text></g>",
             at(x),
             at(y),
             at(y + 3.6),

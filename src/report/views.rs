@@ -18,7 +18,7 @@ pub fn section(choice: &Choice) -> String {
     let best = &choice.table[choice.best];
     let rows: String = ranked(choice).iter().take(TOLD).map(|s| row(s)).collect();
     format!(
-        "<h3>Views tried</h3>\n<div class=\"pair\">{}<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Azimuth</th>\
+        "<h3>Views tried</h3>\n<div class=\"pair views\">{}<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Azimuth</th>\
          <th scope=\"col\">Elevation</th><th scope=\"col\">Distance</th><th scope=\"col\">All inside</th>\
          <th scope=\"col\">Surfaces</th><th scope=\"col\">px</th><th scope=\"col\">Score</th></tr></thead>\n\
          <tbody>{rows}</tbody></table></div></div>\n",
@@ -57,13 +57,9 @@ fn map(table: &[Scored], best: &Scored) -> String {
     let dot = |s: &&Scored| {
         let [x, y] = place(s);
         let tint = ((s.score - low) / (high - low).max(1e-12)).clamp(0.0, 1.0);
-        let hollow = if s.framed { "" } else { " class=\"outside\"" };
-        format!(
-            "<circle{hollow} cx=\"{}\" cy=\"{}\" r=\"4\" opacity=\"{}\"/>",
-            at(x),
-            at(y),
-            number(0.12 + 0.88 * tint, 2)
-        )
+        let class = if s.framed { "" } else { " class=\"outside\"" };
+        let (x, y, tint) = (at(x), at(y), number(100.0 * tint, 0));
+        format!("<circle{class} cx=\"{x}\" cy=\"{y}\" r=\"4.5\" style=\"--t:{tint}%\"/>")
     };
     let dots: String = order.iter().map(dot).collect();
     let [x, y] = place(best).map(at);
@@ -76,7 +72,8 @@ fn map(table: &[Scored], best: &Scored) -> String {
          the chosen one is ringed\">{rings}<path class=\"ring\" d=\"M-{RADIUS} 0H{RADIUS}M0 -{RADIUS}V{RADIUS}\"/>\
          <text x=\"{edge}\" y=\"4\">+x</text><text x=\"0\" y=\"-{edge}\">+y</text>{dots}\
          <circle class=\"best\" cx=\"{x}\" cy=\"{y}\" r=\"7.5\"/></svg><figcaption><small>From above: rings are 30°, 60° and 90° from \
-         overhead, hollow dots do not hold all that is watched.</small></figcaption></figure>"
+         overhead. Darker dots score higher; from hollow ones not all that \
+         is watched lies in the picture.</small></figcaption></figure>"
     )
 }
 
