@@ -99,14 +99,15 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     let found = assembly::analyse(&design, &solids);
     line.keep(|made| made.analysis = Some(found.0.clone()));
     let analysis = line.check(found)?;
-    let trees = assembly::error_tree::object_tree(&design, &analysis.liaison).trees;
     let modes = || assembly::fault::all(&design, &analysis.liaison, &analysis.insertion, &solids);
-    line.keep(|made| (made.trees, made.modes) = (trees.clone(), modes()));
-    line.emit_assembly(&design, &solids, &analysis, &trees);
+    let trees = || assembly::error_tree::object_tree(&design, &analysis.liaison).trees;
+    line.keep(|made| (made.trees, made.modes) = (trees(), modes()));
+    line.emit_assembly(&design, &solids, &analysis);
 
     line.enter(Stage::View)?;
     let bodies = line::bodies(&design, station, &solids);
-    let choice = view::choose::choose(&design, station, &bodies, &view::choose::targets(&trees));
+    let targets = view::choose::targets(&assembly::error_tree::levels(&design, &analysis.liaison));
+    let choice = view::choose::choose(&design, station, &bodies, &targets);
     line.keep(|made| (made.bodies, made.choice) = (bodies.clone(), Some(choice.clone())));
     let camera = line.check((choice.camera, choice.diagnostics.clone()))?;
     line.emit(Artifact::View, || artifacts::view(&design, station, &choice));

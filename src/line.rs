@@ -3,7 +3,7 @@
 
 use crate::artifacts::{self, Artifact, pictures};
 use crate::assembly::Analysis;
-use crate::assembly::error_tree::ErrorTree;
+use crate::assembly::error_tree::{ErrorTree, object_tree};
 use crate::assembly::fault::{self, ErrorMode, FaultKind};
 use crate::assembly::liaison::Liaison;
 use crate::assembly::piece::Workshop;
@@ -178,17 +178,20 @@ impl<'a> Line<'a> {
         }
     }
 
-    pub fn emit_assembly(&mut self, design: &Design, solids: &[Arc<Solid>], analysis: &Analysis, trees: &[ErrorTree]) {
+    pub fn emit_assembly(&mut self, design: &Design, solids: &[Arc<Solid>], analysis: &Analysis) {
         self.emit(Artifact::Contacts, || artifacts::contacts(design, solids, analysis));
         self.emit(Artifact::Liaison, || artifacts::liaison(design, solids, analysis));
-        self.emit(Artifact::ErrorTrees, || artifacts::error_trees(design, trees));
-        self.emit(Artifact::ObjectTree, || artifacts::object_tree(design, trees));
+        // Trees of all watched components in full are a lot of data where there are a thousand.
+        let shows_trees = [Artifact::ErrorTrees, Artifact::ObjectTree].iter().any(|a| self.options.wanted.contains(a));
+        let trees = if shows_trees { object_tree(design, &analysis.liaison).trees } else { Vec::new() };
+        self.emit(Artifact::ErrorTrees, || artifacts::error_trees(design, &trees));
+        self.emit(Artifact::ObjectTree, || artifacts::object_tree(design, &trees));
         self.emit(Artifact::Insertion, || artifacts::insertion(design, solids, analysis));
         self.emit(Artifact::Measures, || artifacts::measures(analysis));
         self.emit_files(Artifact::Gltf, || artifacts::exchange::gltf(design, solids, analysis));
         self.emit_files(Artifact::Liaison, || pictures::liaison(design, solids, analysis));
-        self.emit_files(Artifact::ErrorTrees, || pictures::error_trees(design, solids, analysis, trees));
-        self.emit_files(Artifact::ObjectTree, || pictures::object_tree(design, solids, analysis, trees));
+        self.emit_files(Artifact::ErrorTrees, || pictures::error_trees(design, solids, analysis, &trees));
+        self.emit_files(Artifact::ObjectTree, || pictures::object_tree(design, solids, analysis, &trees));
         self.emit_files(Artifact::Exploded, || pictures::exploded(design, solids, analysis));
     }
 

@@ -39,7 +39,7 @@ impl Wheel {
     }
 
     fn touching(&self, name: &str) -> Vec<&str> {
-        self.analysis.liaison.neighbours(self.index(name)).into_iter().map(|c| self.name(c)).collect()
+        self.analysis.liaison.neighbours(self.index(name)).iter().map(|c| self.name(*c)).collect()
     }
 
     fn modes(&self) -> Vec<ErrorMode> {

@@ -16,8 +16,6 @@ use std::panic::catch_unwind;
 const PARTS: &str = include_str!("oracle/parts.txt");
 /// Relative difference of volume and area from Open CASCADE's.
 const EXACT: f64 = 1e-6;
-/// Parts that are solids, and that the kernel is known to refuse with these codes. It may not get a figure wrong.
-const REFUSED: [(&str, &str); 1] = [("a99", "E0410")];
 
 /// A part of the data with what is expected of it.
 #[derive(Debug)]
@@ -51,20 +49,19 @@ fn every_part_has_the_figures_of_open_cascade() {
     let other =
         std::env::var("GONOGO_PARTS").map(|path| std::fs::read_to_string(path).expect("GONOGO_PARTS names a file"));
     let cases = read(other.as_deref().unwrap_or(PARTS));
-    let mut tally: BTreeMap<char, [usize; 3]> = BTreeMap::new();
+    let mut tally: BTreeMap<char, [usize; 2]> = BTreeMap::new();
     let mut failures: Vec<(usize, String)> = Vec::new();
     for (case, outcome) in cases.iter().zip(judge_all(&cases)) {
         let tally = tally.entry(case.family()).or_default();
         match outcome {
             Outcome::Right => tally[0] += 1,
-            Outcome::Refused => tally[1] += 1,
             Outcome::Wrong(why) => {
-                tally[2] += 1;
+                tally[1] += 1;
                 failures.push((case.features.len(), format!("{}\n{why}\n", case.text())));
             }
         }
     }
-    println!("family: right, refused as known, wrong: {tally:?}");
+    println!("family: right, wrong: {tally:?}");
     failures.sort();
     let list: Vec<&str> = failures.iter().map(|(_, text)| text.as_str()).collect();
     assert!(failures.is_empty(), "{} of {} parts differ\n\n{}", list.len(), cases.len(), list.join("\n"));
@@ -72,7 +69,6 @@ fn every_part_has_the_figures_of_open_cascade() {
 
 enum Outcome {
     Right,
-    Refused,
     Wrong(String),
 }
 
@@ -95,7 +91,6 @@ fn judge(case: &Case) -> Outcome {
         (Expected::Touching(expected), Ok(solid)) => verdict(differences(&expected.counted_in(&solid), &solid)),
         (Expected::Touching(_), Err(codes)) if codes == ["E0407"] => Outcome::Right,
         (Expected::Refused(code), Err(codes)) if fitting(code, &codes) => Outcome::Right,
-        (_, Err(codes)) if known_refusal(&case.name, &codes) => Outcome::Refused,
         (Expected::Refused(code), Ok(solid)) => {
             Outcome::Wrong(format!("is built, {code} expected: {:?}", Figures::of(&solid)))
         }
@@ -106,10 +101,6 @@ fn judge(case: &Case) -> Outcome {
 /// Pieces that touch along a line may be reported as either.
 fn fitting(expected: &str, codes: &[String]) -> bool {
     codes == [expected] || expected == "E0405" && codes == ["E0407"]
-}
-
-fn known_refusal(name: &str, codes: &[String]) -> bool {
-    REFUSED.iter().any(|(part, code)| *part == name && codes == [*code])
 }
 
 fn verdict(differences: Vec<String>) -> Outcome {

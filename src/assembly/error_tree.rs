@@ -8,8 +8,7 @@ use super::contact::FaceRef;
 use super::liaison::Liaison;
 use crate::design::model::Design;
 use serde::Serialize;
-use std::collections::btree_map::Entry;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 /// What an error in one component can do to the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -42,35 +41,57 @@ pub struct Edge {
 
 /// The error tree of a component, down to `depth` levels below it (`None`: all that can be reached).
 pub fn error_tree(liaison: &Liaison, root: usize, depth: Option<u32>) -> ErrorTree {
-    let mut nodes = vec![TreeNode { component: root, parent: None, level: 0, surfaces: liaison.surfaces(root) }];
-    let mut place = BTreeMap::from([(root, 0)]);
-    let mut queue = VecDeque::from([0]);
-    while let Some(at) = queue.pop_front() {
-        if depth.is_some_and(|d| nodes[at].level >= d) {
-            continue;
-        }
-        for neighbour in liaison.neighbours(nodes[at].component) {
-            if let Entry::Vacant(vacant) = place.entry(neighbour) {
-                vacant.insert(nodes.len());
-                queue.push_back(nodes.len());
-                nodes.push(child(liaison, &nodes, at, neighbour));
-            }
-        }
-    }
-    let dashed = dashed(liaison, &nodes, &place);
+    let reached = spread(liaison, root, depth, &mut vec![false; liaison.components]);
+    let nodes: Vec<TreeNode> = reached.iter().map(|r| node(liaison, &reached, r)).collect();
+    let dashed = dashed(liaison, &nodes);
     ErrorTree { nodes, dashed }
 }
 
-fn child(liaison: &Liaison, nodes: &[TreeNode], parent: usize, component: usize) -> TreeNode {
-    let contacts = liaison.between(nodes[parent].component, component);
-    let mut surfaces: Vec<FaceRef> = contacts.filter_map(|c| c.on(component)).collect();
-    surfaces.sort();
-    surfaces.dedup();
-    TreeNode { component, parent: Some(parent), level: nodes[parent].level + 1, surfaces }
+/// A component that an error spreads to.
+#[derive(Clone, Copy)]
+struct Reached {
+    component: usize,
+    /// Place in the order of reaching; `None` for the root.
+    parent: Option<usize>,
+    level: u32,
 }
 
-/// `place` is where each component stands among the nodes.
-fn dashed(liaison: &Liaison, nodes: &[TreeNode], place: &BTreeMap<usize, usize>) -> Vec<Edge> {
+/// Who is reached from a root, breadth-first. `known` holds a mark per component, all clear before and after.
+fn spread(liaison: &Liaison, root: usize, depth: Option<u32>, known: &mut [bool]) -> Vec<Reached> {
+    let mut reached = vec![Reached { component: root, parent: None, level: 0 }];
+    known[root] = true;
+    let mut at = 0;
+    while let Some(&Reached { component, level, .. }) = reached.get(at) {
+        let onwards = if depth.is_none_or(|d| level < d) { liaison.neighbours(component) } else { &[] };
+        for &neighbour in onwards {
+            if !std::mem::replace(&mut known[neighbour], true) {
+                reached.push(Reached { component: neighbour, parent: Some(at), level: level + 1 });
+            }
+        }
+        at += 1;
+    }
+    reached.iter().for_each(|r| known[r.component] = false);
+    reached
+}
+
+fn node(liaison: &Liaison, reached: &[Reached], &Reached { component, parent, level }: &Reached) -> TreeNode {
+    let surfaces = match parent {
+        Some(parent) => between(liaison, reached[parent].component, component),
+        None => liaison.surfaces(component),
+    };
+    TreeNode { component, parent, level, surfaces }
+}
+
+/// Surfaces of `component` that touch `parent`, each once.
+fn between(liaison: &Liaison, parent: usize, component: usize) -> Vec<FaceRef> {
+    let mut surfaces: Vec<FaceRef> = liaison.between(parent, component).filter_map(|c| c.on(component)).collect();
+    surfaces.sort();
+    surfaces.dedup();
+    surfaces
+}
+
+fn dashed(liaison: &Liaison, nodes: &[TreeNode]) -> Vec<Edge> {
+    let place: BTreeMap<usize, usize> = nodes.iter().enumerate().map(|(i, n)| (n.component, i)).collect();
     let later = |i: usize| {
         let others = liaison.neighbours(nodes[i].component);
         let mut later: Vec<usize> = others.iter().filter_map(|c| place.get(c).copied()).filter(|j| *j > i).collect();
@@ -78,6 +99,35 @@ fn dashed(liaison: &Liaison, nodes: &[TreeNode], place: &BTreeMap<usize, usize>)
         later.into_iter().filter(move |j| nodes[*j].parent != Some(i)).map(move |j| Edge { nodes: [i, j] })
     };
     (0..nodes.len()).flat_map(later).collect()
+}
+
+/// The least level at which each surface stands in the error trees of the watched components.
+///
+/// The same as asking all trees of [`object_tree`], but with one of them in memory at a time: a thousand trees of a thousand
+/// components are a million nodes.
+pub fn levels(design: &Design, liaison: &Liaison) -> BTreeMap<FaceRef, u32> {
+    let mut watched = vec![false; liaison.components];
+    design.inspect.watch.iter().for_each(|w| watched[w.component] = true);
+    // All surfaces of a watched component are at level 0 in its own tree, and no other tree can better that.
+    let roots = (0..liaison.components).filter(|c| watched[*c]).flat_map(|c| liaison.surfaces(c));
+    let mut levels: BTreeMap<FaceRef, u32> = roots.map(|face| (face, 0)).collect();
+    let mut pairs: BTreeMap<(usize, usize), u32> = BTreeMap::new();
+    let mut known = vec![false; liaison.components];
+    for watch in &design.inspect.watch {
+        let reached = spread(liaison, watch.component, watch.depth, &mut known);
+        for r in reached.iter().filter(|r| !watched[r.component]) {
+            let Some(parent) = r.parent else { continue };
+            let level = pairs.entry((reached[parent].component, r.component)).or_insert(r.level);
+            *level = r.level.min(*level);
+        }
+    }
+    for ((parent, component), found) in pairs {
+        for face in between(liaison, parent, component) {
+            let level = levels.entry(face).or_insert(found);
+            *level = found.min(*level);
+        }
+    }
+    levels
 }
 
 /// The error trees of all watched components under one root, the assembly as a whole.
@@ -125,6 +175,7 @@ fn summarise(design: &Design, tree: &ErrorTree, children: &[Vec<usize>], node: u
 mod tests {
     use super::*;
     use crate::assembly::{contact::contacts, sample};
+    use crate::design::model::Watch;
 
     fn liaison() -> (sample::Assembly, Liaison) {
         let a = sample::pattern_wheel();
@@ -158,6 +209,27 @@ mod tests {
             let pairs: usize = (0..liaison.components).map(|c| liaison.neighbours(c).len()).sum::<usize>() / 2;
             assert_eq!(tree.nodes.len(), liaison.components);
             assert_eq!(tree.nodes.len() - 1 + tree.dashed.len(), pairs);
+        }
+    }
+
+    /// Of the watched components by themselves, of one, of some with and without a depth.
+    #[test]
+    fn the_levels_of_all_trees_are_the_least_of_each() {
+        let (mut a, liaison) = liaison();
+        let watches: [&[(usize, Option<u32>)]; 4] =
+            [&[], &[(8, None)], &[(5, None), (9, Some(1)), (1, Some(2))], &[(2, Some(0))]];
+        for watch in watches {
+            if !watch.is_empty() {
+                a.design.inspect.watch = watch.iter().map(|&(component, depth)| Watch { component, depth }).collect();
+            }
+            let mut least: BTreeMap<FaceRef, u32> = BTreeMap::new();
+            for node in object_tree(&a.design, &liaison).trees.iter().flat_map(|t| &t.nodes) {
+                for face in &node.surfaces {
+                    let level = least.entry(*face).or_insert(node.level);
+                    *level = node.level.min(*level);
+                }
+            }
+            assert_eq!(levels(&a.design, &liaison), least);
         }
     }
 

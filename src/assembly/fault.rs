@@ -120,7 +120,7 @@ pub fn wrong_parts(design: &Design, liaison: &Liaison, solids: &[Arc<Solid>]) ->
 pub fn datum(liaison: &Liaison, mode: &ErrorMode) -> Vec<usize> {
     let hidden = match mode.kind {
         FaultKind::Misplaced => liaison.neighbours(mode.component),
-        _ => Vec::new(),
+        _ => &[],
     };
     (0..liaison.components).filter(|c| *c != mode.component && !hidden.contains(c)).collect()
 }

@@ -22,6 +22,8 @@ pub struct Liaison {
     pub tangents: Vec<Contact>,
     /// Per component the indices of its contacts, ascending.
     touching: Vec<Vec<usize>>,
+    /// Per component those that touch it, ascending.
+    beside: Vec<Vec<usize>>,
 }
 
 impl Liaison {
@@ -42,7 +44,14 @@ impl Liaison {
         for (index, contact) in contacts.iter().enumerate() {
             [contact.a, contact.b].iter().for_each(|f| touching[f.component].push(index));
         }
-        Liaison { components, contacts, tangents, touching }
+        let others = |(component, touching): (usize, &Vec<usize>)| -> Vec<usize> {
+            let mut others: Vec<usize> = touching.iter().map(|i| contacts[*i].other(component)).collect();
+            others.sort_unstable();
+            others.dedup();
+            others
+        };
+        let beside = touching.iter().enumerate().map(others).collect();
+        Liaison { components, contacts, tangents, touching, beside }
     }
 
     /// Contacts of one component.
@@ -57,9 +66,8 @@ impl Liaison {
     }
 
     /// Components that touch this one, in the design's order.
-    pub fn neighbours(&self, component: usize) -> Vec<usize> {
-        let set: BTreeSet<usize> = self.of(component).map(|c| c.other(component)).collect();
-        set.into_iter().collect()
+    pub fn neighbours(&self, component: usize) -> &[usize] {
+        &self.beside[component]
     }
 
     /// Surfaces of a component that touch something, each once.

@@ -46,18 +46,15 @@ impl Meetings {
     pub fn new(direction: Unit<Vector3<f64>>, solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Self {
         let shades = shades(&Frame::along(direction), solids, poses);
         let tree = BoxTree::new(shades.iter().map(Shade::bounds).collect());
-        let mut pairs: Vec<([usize; 2], usize)> = Vec::new();
-        let (mut jobs, mut known) = (Vec::new(), BTreeMap::new());
-        for a in 0..shades.len() {
-            for b in tree.meeting(&shades[a].bounds()).into_iter().filter(|b| *b > a) {
-                let job = *known.entry(key(&shades[a], &shades[b])).or_insert_with(|| {
-                    jobs.push([a, b]);
-                    jobs.len() - 1
-                });
-                pairs.push(([a, b], job));
-            }
-        }
-        let met: Vec<Option<Meeting>> = jobs.par_iter().map(|pair| meeting(pair.map(|i| &shades[i]))).collect();
+        let near =
+            |a: usize| tree.meeting(&shades[a].bounds()).into_iter().filter(move |b| *b > a).map(move |b| [a, b]);
+        let shades_of = |[a, b]: [usize; 2]| [&shades[a], &shades[b]];
+        // Whether one passes the other by does not depend on their heights: a pin through ten plates is asked about once.
+        let passing = Alike::of((0..shades.len()).flat_map(near), |pair| shadow_key(shades_of(pair)));
+        let pass: Vec<bool> = passing.jobs.par_iter().map(|pair| pass_by(shades_of(*pair))).collect();
+        let stopped = passing.pairs.iter().filter(|(_, job)| !pass[*job]).map(|(pair, _)| *pair);
+        let Alike { pairs, jobs } = Alike::of(stopped, |pair| key(shades_of(pair)));
+        let met: Vec<Option<Meeting>> = jobs.par_iter().map(|pair| meeting(shades_of(*pair))).collect();
         let mut meetings = Meetings { way: vec![Vec::new(); shades.len()], entering: Vec::new() };
         for ([a, b], job) in pairs {
             if let Some(meeting) = &met[job] {
@@ -79,9 +76,53 @@ impl Meetings {
     }
 }
 
+/// Pairs of bodies, and the first of each kind of pairs that are alike.
+struct Alike {
+    /// Each with the place of its kind in `jobs`.
+    pairs: Vec<([usize; 2], usize)>,
+    jobs: Vec<[usize; 2]>,
+}
+
+impl Alike {
+    fn of<K: Ord>(all: impl Iterator<Item = [usize; 2]>, key: impl Fn([usize; 2]) -> K) -> Alike {
+        let (mut alike, mut known) = (Alike { pairs: Vec::new(), jobs: Vec::new() }, BTreeMap::new());
+        for pair in all {
+            let job = *known.entry(key(pair)).or_insert_with(|| {
+                alike.jobs.push(pair);
+                alike.jobs.len() - 1
+            });
+            alike.pairs.push((pair, job));
+        }
+        alike
+    }
+}
+
 /// What a pair's meeting depends on: the two silhouettes and how the second stands to the first.
-fn key(a: &Shade, b: &Shade) -> (usize, usize, [i64; 3]) {
-    (a.number, b.number, [0, 1, 2].map(|i| ((b.shift[i] - a.shift[i]) / SAME_PLACE).round() as i64))
+fn key([a, b]: [&Shade; 2]) -> (usize, usize, [i64; 3]) {
+    (a.number, b.number, [0, 1, 2].map(|i| place_of(a, b, i)))
+}
+
+/// The same without the heights.
+fn shadow_key([a, b]: [&Shade; 2]) -> (usize, usize, [i64; 2]) {
+    (a.number, b.number, [0, 1].map(|i| place_of(a, b, i)))
+}
+
+fn place_of(a: &Shade, b: &Shade, axis: usize) -> i64 {
+    ((b.shift[axis] - a.shift[axis]) / SAME_PLACE).round() as i64
+}
+
+/// Whether the two pass each other by, whatever their heights: beside each other, or one in a round opening of the other.
+fn pass_by(bodies: [&Shade; 2]) -> bool {
+    let size = shared(bodies).1;
+    // Overlap narrower than a cell never fills the three cells that count.
+    let clear = |p: usize| bodies[p].is_clear_of(bodies[1 - p], FINEST_CELL);
+    size[0] <= 0.0 || size[1] <= 0.0 || clear(0) || clear(1)
+}
+
+/// What two extents have in common, and its width along u and v.
+fn shared(bodies: [&Shade; 2]) -> (Extent, [f64; 2]) {
+    let region = bodies[0].extent().common(&bodies[1].extent());
+    (region, [0, 1].map(|i| region.high[i] - region.low[i]))
 }
 
 /// How two bodies meet along the direction.
@@ -93,15 +134,11 @@ struct Meeting {
     depth: Option<f64>,
 }
 
-/// `None` for bodies that pass each other by.
+/// How two bodies meet that do not pass each other by; `None` where they share nothing.
 fn meeting(bodies: [&Shade; 2]) -> Option<Meeting> {
     let [first, second] = bodies.map(Shade::extent);
-    let region = first.common(&second);
-    let size = [0, 1].map(|i| region.high[i] - region.low[i]);
-    let apart = size[0] <= 0.0 || size[1] <= 0.0;
-    // Overlap narrower than a cell never fills the three cells that count.
-    let clear = |p: usize| bodies[p].is_clear_of(bodies[1 - p], FINEST_CELL);
-    if apart || clear(0) || clear(1) {
+    let (region, size) = shared(bodies);
+    if size[0] <= 0.0 || size[1] <= 0.0 {
         return None;
     }
     let cell = (size[0].max(size[1]) / CELLS_ACROSS).max(FINEST_CELL);

@@ -24,6 +24,12 @@ pub fn calibrate(args: &Calibrate) -> Result<Exit, Failure> {
     let photos = args.photos.iter().map(|p| photo(p, &model)).collect::<Result<Vec<Photo>, Failure>>()?;
     match calibrate::calibrate(&model, &photos) {
         Ok(calibration) => {
+            for doubt in calibrate::doubts(&model, &calibration, &photos).unwrap_or_default() {
+                output::remark(&format!(
+                    "warning: by the renders alone {} looks {}; the photo counts as correct: make sure that it is",
+                    doubt.component, doubt.fault
+                ));
+            }
             output::write(&args.output, calibration.write().as_bytes())?;
             Ok(Exit::Fine)
         }

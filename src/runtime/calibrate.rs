@@ -168,19 +168,36 @@ impl Calibration {
 /// no render knows.
 pub fn calibrate(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationError> {
     let calibration = fit(model, photos)?;
-    // Photos must be right by the renders alone: what they show is not taken for granted yet.
-    let naive = Calibration { references: Vec::new(), ..calibration.clone() };
-    let inspector = Inspector::new(model, &naive).ok_or(CalibrationError::Unusable)?;
-    for photo in photos {
-        let verdict = inspector.inspect(photo);
-        let proven =
-            |f: &&Finding| model.nodes.iter().zip(&verdict.nodes).any(|(n, r)| n.name == f.component && proves(n, r));
-        if let Some(finding) = verdict.findings.iter().find(proven) {
-            let (component, fault) = (finding.component.clone(), finding.fault.clone());
-            return Err(CalibrationError::Faulty { component, fault });
+    for (finding, proven) in suspicions(model, &calibration, photos)? {
+        if proven {
+            return Err(CalibrationError::Faulty { component: finding.component, fault: finding.fault });
         }
     }
     Ok(calibration)
+}
+
+/// What looks faulty in the photos of a calibration without being proven: whoever calibrates should look again.
+pub fn doubts(model: &Model, calibration: &Calibration, photos: &[Photo]) -> Result<Vec<Finding>, CalibrationError> {
+    let all = suspicions(model, calibration, photos)?;
+    Ok(all.into_iter().filter(|(_, proven)| !proven).map(|(finding, _)| finding).collect())
+}
+
+/// Findings by the renders alone, and whether they are proven: what the photos show is not taken for granted yet.
+fn suspicions(
+    model: &Model,
+    calibration: &Calibration,
+    photos: &[Photo],
+) -> Result<Vec<(Finding, bool)>, CalibrationError> {
+    let naive = Calibration { references: Vec::new(), ..calibration.clone() };
+    let inspector = Inspector::new(model, &naive).ok_or(CalibrationError::Unusable)?;
+    let mut out = Vec::new();
+    for verdict in photos.iter().map(|photo| inspector.inspect(photo)) {
+        for finding in &verdict.findings {
+            let own = |(n, r): (&Node, &NodeReport)| n.name == finding.component && proves(n, r);
+            out.push((finding.clone(), model.nodes.iter().zip(&verdict.nodes).any(own)));
+        }
+    }
+    Ok(out)
 }
 
 /// Whether a node's verdict by renders alone proves a fault. Under a light that is not quite the described one a sound part

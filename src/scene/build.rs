@@ -9,9 +9,10 @@ use super::{Body, Emitter, Finish, Ground, Lamp, Scene};
 use crate::design::model::{CameraSpec, LightShape, LightSpec, Material, Station};
 use crate::rng::Stream;
 use crate::runtime::camera::{Camera, Vec3, cross, dot, normalise, sub};
-use crate::solid::Solid;
+use crate::solid::{Solid, TriMesh};
 use crate::units::Range;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use std::collections::HashMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
@@ -121,8 +122,10 @@ pub fn scene(
 pub fn bodies(instance: &Instance, standing: [f64; 4]) -> Vec<Body> {
     let stand = stand(standing);
     let present = instance.solids.iter().enumerate().filter_map(|(i, solid)| Some((i, solid.as_ref()?)));
+    // Pieces that are one solid are one mesh.
+    let mut meshes: HashMap<*const Solid, Arc<TriMesh>> = HashMap::new();
     let body = |(component, solid): (usize, &Arc<Solid>)| Body {
-        mesh: Arc::new(solid.mesh.clone()),
+        mesh: meshes.entry(Arc::as_ptr(solid)).or_insert_with(|| Arc::new(solid.mesh.clone())).clone(),
         pose: stand * instance.poses[component],
         finish: instance.finishes[component].clone(),
         component,

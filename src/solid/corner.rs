@@ -44,22 +44,22 @@ pub(super) fn sharpest(
 }
 
 /// Directions at a corner that differ by less (rad) touch: two curves that overlap by the tolerance of touching.
-const TIE: f64 = 2e-5;
+pub(super) const TIE: f64 = 2e-5;
 /// Bends (1/mm) that differ by less are one edge's.
 const SAME_BEND: f64 = 1e-6;
 
 /// How a half-edge leaves its corner: direction, and how the direction turns per mm.
-struct Leaving {
+pub(super) struct Leaving {
     corner: Point3<f64>,
-    direction: Vector3<f64>,
-    bend: Vector3<f64>,
+    pub direction: Vector3<f64>,
+    pub bend: Vector3<f64>,
 }
 
 /// Share of an edge over which its bend at the end is taken.
 const BEND_SHARE: f64 = 1e-3;
 
 impl Leaving {
-    fn new(arrangement: &Arrangement, (arc, forward): (usize, bool)) -> Self {
+    pub fn new(arrangement: &Arrangement, (arc, forward): (usize, bool)) -> Self {
         let arc = &arrangement.arcs[arc];
         let locus = &arrangement.curves[arc.curve];
         let way = if forward { 1.0 } else { -1.0 };

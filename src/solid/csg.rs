@@ -10,6 +10,7 @@ use crate::design::model::{Feature, FeatureCopy, Op, Part, Shape, Values};
 use crate::diag::{Diagnostic, Span};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::iter::Peekable;
 use std::ops::Range;
 
@@ -167,7 +168,14 @@ pub(super) struct Tree<'a> {
     pub surfaces: Vec<Surface>,
     pub leaves: Vec<Leaf>,
     steps: Vec<Step>,
+    /// Surfaces by [`Tree::key`].
+    index: BTreeMap<i64, Vec<usize>>,
+    /// A point of no symmetry, so that few surfaces share a key.
+    reference: Point3<f64>,
 }
+
+/// Width of a key's bin in mm.
+const BIN: f64 = 1e-3;
 
 impl<'a> Tree<'a> {
     /// Resolves the part at these values.
@@ -181,7 +189,11 @@ impl<'a> Tree<'a> {
         let material: Vec<Point3<f64>> =
             leaves.iter().filter(|l| l.adds && !l.solid.is_through()).flat_map(|l| l.solid.corners()).collect();
         leaves.iter_mut().filter(|l| l.solid.is_through()).for_each(|l| l.solid.reach_through(&material));
-        let mut tree = Tree { part, surfaces: Vec::new(), leaves: Vec::new(), steps };
+        let mut all = Bounds::empty();
+        leaves.iter().flat_map(|l| l.solid.corners()).for_each(|p| all.include(&p));
+        let reference = all.low + (all.high - all.low).component_mul(&Vector3::new(0.137, 0.291, 0.411));
+        let index = BTreeMap::new();
+        let mut tree = Tree { part, surfaces: Vec::new(), leaves: Vec::new(), steps, index, reference };
         leaves.into_iter().for_each(|leaf| tree.add_leaf(leaf));
         tree.check_apart()?;
         Ok(tree)
@@ -190,8 +202,8 @@ impl<'a> Tree<'a> {
     /// Refuses features with faces that almost coincide: whether they do is then a matter of rounding.
     fn check_apart(&self) -> Result<(), Vec<Diagnostic>> {
         for (i, first) in self.surfaces.iter().enumerate() {
-            let close = |j: &usize| coincide(first, &self.surfaces[*j], tolerance::APART).is_some();
-            for j in (i + 1..self.surfaces.len()).filter(close) {
+            let close = |j: &usize| *j > i && coincide(first, &self.surfaces[*j], tolerance::APART).is_some();
+            for j in self.near(first, tolerance::APART).into_iter().filter(close) {
                 let on = |s: usize| self.leaves.iter().filter(move |l| l.sides.iter().any(|side| side.surface == s));
                 let meets = |a: &&Leaf, b: &Leaf| a.bounds.widened(tolerance::CULL).common(&b.bounds).is_some();
                 let pair = on(i).find_map(|a| on(j).find(|b| meets(b, a)).map(|b| (a, b)));
@@ -248,13 +260,34 @@ impl<'a> Tree<'a> {
 
     /// Index of the surface, and whether its canonical normal points the same way.
     fn intern(&mut self, surface: Surface) -> (usize, bool) {
-        for (i, known) in self.surfaces.iter().enumerate() {
-            if let Some(same) = coincide(known, &surface, tolerance::POINT) {
-                return (i, same);
-            }
+        let same = |i: usize| Some((i, coincide(&self.surfaces[i], &surface, tolerance::POINT)?));
+        if let Some(known) = self.near(&surface, tolerance::POINT).into_iter().find_map(same) {
+            return known;
         }
+        self.index.entry((self.key(&surface) / BIN) as i64).or_default().push(self.surfaces.len());
         self.surfaces.push(surface);
         (self.surfaces.len() - 1, true)
+    }
+
+    /// Surfaces that may coincide with this one within a distance, ascending.
+    fn near(&self, surface: &Surface, within: f64) -> Vec<usize> {
+        let far = (surface.origin() - self.reference).norm() + self.reference.coords.norm();
+        let (key, off) = (self.key(surface), 4.0 * within + 4.0 * tolerance::DIRECTION * far);
+        let [low, high] = [key - off, key + off].map(|k| (k / BIN) as i64);
+        let mut near: Vec<usize> = self.index.range(low..=high).flat_map(|bin| bin.1).copied().collect();
+        near.sort_unstable();
+        near
+    }
+
+    /// A length (mm) that surfaces which coincide share, but for their tolerance.
+    fn key(&self, surface: &Surface) -> f64 {
+        let p = &self.reference;
+        match surface {
+            Surface::Plane { .. } => surface.distance(p).abs(),
+            Surface::Cylinder { point, axis, radius } => radial(point, axis, p).norm() + radius,
+            Surface::Sphere { centre, radius, .. } => (p - centre).norm() + radius,
+            Surface::Cone { apex: place, .. } | Surface::Torus { centre: place, .. } => (p - place).norm(),
+        }
     }
 }
 

@@ -150,9 +150,7 @@ fn developed(surface: &Surface, loops: &[Vec<Run>]) -> f64 {
     };
     let (axis, origin) = (surface.axis(), surface.origin());
     let under = |run: &Run| match run.locus {
-        Locus::Circle { centre, axis: own, .. }
-            if own.cross(&axis).norm() < ABOUT && (centre - origin).cross(&axis).norm() < ABOUT =>
-        {
+        Locus::Circle { axis: own, .. } if is_about(run.locus, surface) => {
             let turn = (run.span[1] - run.span[0]) * own.dot(&axis).signum();
             -surface.chart(&run.locus.at(run.span[0]))[1] * girth * turn * run.way()
         }
@@ -165,6 +163,13 @@ fn developed(surface: &Surface, loops: &[Vec<Run>]) -> f64 {
         }
     };
     loops.iter().flatten().map(under).sum()
+}
+
+/// Whether the curve is a circle about the surface's axis: straight in its chart.
+pub(super) fn is_about(locus: &Locus, surface: &Surface) -> bool {
+    let Locus::Circle { centre, axis, .. } = locus else { return false };
+    let own = surface.axis();
+    axis.cross(&own).norm() < ABOUT && (centre - surface.origin()).cross(&own).norm() < ABOUT
 }
 
 /// A circle whose axis is off by less (rad, mm) goes round the surface's own axis.

@@ -8,7 +8,7 @@ use super::border::{Grid, Outline};
 use super::ring::{Chart, Node, Ring, lay_out, offsets};
 use super::surface::tube_angle;
 use super::{Face, Quality, Solid, Surface, TriMesh, tolerance};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 use std::collections::HashMap;
@@ -46,35 +46,52 @@ pub(super) fn triangulate(solid: &Solid, quality: &Quality) -> Result<TriMesh, u
 /// How often diagonals that two faces have in common are looked for.
 const ROUNDS: usize = 6;
 
-/// One side of a triangle: its lower and higher vertex, whether it runs upwards, and the face.
-type Side = (u32, u32, bool, usize);
+/// One side of a triangle, from its lower vertex: the higher one, whether the triangle runs upwards along it, and the face.
+type Side = (u32, bool, u32);
 
-/// The sides of all triangles, those between the same vertices together.
-struct Sides(Vec<Side>);
+/// The sides of all triangles, by their lower vertex; those between the same vertices together.
+struct Sides {
+    /// Where the sides of each vertex begin, and where those of the last end.
+    starts: Vec<usize>,
+    all: Vec<Side>,
+}
 
 impl Sides {
     fn of(mesh: &TriMesh) -> Sides {
-        let side = |a: u32, b: u32, face: u32| (a.min(b), a.max(b), a < b, face as usize);
-        let sides = |(t, face): (&[u32; 3], &u32)| [0, 1, 2].map(|k| side(t[k], t[(k + 1) % 3], *face));
-        let mut all: Vec<Side> = mesh.triangles.iter().zip(&mesh.faces).flat_map(sides).collect();
-        all.sort_unstable();
-        Sides(all)
+        let sides = |(t, face): (&[u32; 3], &u32)| [0, 1, 2].map(|k| (t[k], t[(k + 1) % 3], *face));
+        let sides = || mesh.triangles.iter().zip(&mesh.faces).flat_map(sides);
+        let mut starts = vec![0; mesh.positions.len() + 1];
+        sides().for_each(|(a, b, _)| starts[a.min(b) as usize + 1] += 1);
+        (1..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
+        let mut next = starts.clone();
+        let mut all = vec![(0, false, 0); 3 * mesh.triangles.len()];
+        for (a, b, face) in sides() {
+            let place = &mut next[a.min(b) as usize];
+            all[*place] = (a.max(b), a < b, face);
+            *place += 1;
+        }
+        starts.windows(2).for_each(|w| all[w[0]..w[1]].sort_unstable());
+        Sides { starts, all }
     }
 
-    fn groups(&self) -> impl Iterator<Item = &[Side]> {
-        self.0.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1))
+    /// The lower vertex of a side, and all that run between the same two.
+    fn groups(&self) -> impl Iterator<Item = (u32, &[Side])> {
+        let from = |(a, w): (usize, &[usize])| {
+            self.all[w[0]..w[1]].chunk_by(|s, t| s.0 == t.0).map(move |group| (a as u32, group))
+        };
+        self.starts.windows(2).enumerate().flat_map(from)
     }
 
     /// A face with a side that no triangle goes back along.
     fn open(&self) -> Option<usize> {
-        let unpaired = |group: &&[Side]| 2 * group.iter().filter(|s| s.2).count() != group.len();
-        self.groups().find(unpaired).map(|group| group[0].3)
+        let unpaired = |(_, group): &(u32, &[Side])| 2 * group.iter().filter(|s| s.1).count() != group.len();
+        self.groups().find(unpaired).map(|(_, group)| group[0].2 as usize)
     }
 
     /// Sides that more than two triangles meet at, with the faces.
     fn doubled(&self) -> Vec<(u32, u32, Vec<usize>)> {
-        let many = self.groups().filter(|group| group.len() > 2);
-        many.map(|group| (group[0].0, group[0].1, group.iter().map(|s| s.3).collect())).collect()
+        let many = self.groups().filter(|(_, group)| group.len() > 2);
+        many.map(|(a, group)| (a, group[0].0, group.iter().map(|s| s.2 as usize).collect())).collect()
     }
 }
 
@@ -251,8 +268,9 @@ fn girth(surface: &Surface, outline: &Outline) -> f64 {
 
 /// Adds the triangles of one face.
 fn fill(solid: &Solid, face: usize, patch: &Patch, mesh: &mut TriMesh) -> Option<()> {
-    if let Some(triangles) = strip(patch) {
-        triangles.into_iter().for_each(|t| add_triangle(solid, face, &patch.chart, t, mesh));
+    if let Some((nodes, low)) = strip(patch) {
+        let triangles = zipped(&nodes, low);
+        add_triangles(solid, face, &patch.chart, &nodes, triangles, mesh);
         return Some(());
     }
     let mut nodes: Vec<Node> = Vec::new();
@@ -266,17 +284,20 @@ fn fill(solid: &Solid, face: usize, patch: &Patch, mesh: &mut TriMesh) -> Option
     nodes.extend_from_slice(&patch.inner);
     let girth = girth(patch.chart.surface, &patch.outline);
     let points: Vec<[f64; 2]> = nodes.iter().map(|n| flat(&patch.chart, girth, n.uv)).collect();
-    for corners in delaunay(&points, &border)? {
-        add_triangle(solid, face, &patch.chart, corners.map(|i| nodes[i]), mesh);
-    }
+    let is_plain = matches!(patch.chart.surface, Surface::Plane { .. }) && patch.outline.holes.len() < 2;
+    let plain = if is_plain { super::flat::triangles(&points, patch.outline.outer.len()) } else { None };
+    let triangles = plain.or_else(|| delaunay(&points, &border))?;
+    add_triangles(solid, face, &patch.chart, &nodes, triangles, mesh);
     Some(())
 }
 
-/// Triangles between two rows of nodes along circles about the axis: most faces of cylinders and cones, and flat
+/// Nodes of two rows along circles about the axis, and how many the lower one has: most faces of cylinders and cones, and flat
 /// quadrangles whose sides run along the chart.
-fn strip(patch: &Patch) -> Option<Vec<[Node; 3]>> {
-    let (low, high) = rows_of_strip(patch.chart.surface, &patch.outline)?;
-    Some(zipped(&low, &high))
+fn strip(patch: &Patch) -> Option<(Vec<Node>, usize)> {
+    let (mut low, high) = rows_of_strip(patch.chart.surface, &patch.outline)?;
+    let count = low.len();
+    low.extend(high);
+    Some((low, count))
 }
 
 /// The two rows, by ascending u, of a face that has no other nodes.
@@ -300,20 +321,20 @@ fn rows_of_strip(surface: &Surface, outline: &Outline) -> Option<(Vec<Node>, Vec
 }
 
 /// Triangles between two rows of ascending u, the one that lags being advanced.
-fn zipped(low: &[Node], high: &[Node]) -> Vec<[Node; 3]> {
-    let mut triangles = Vec::with_capacity(low.len() + high.len());
-    let (mut i, mut j) = (0, 0);
+fn zipped(nodes: &[Node], low: usize) -> Vec<[usize; 3]> {
+    let mut triangles = Vec::with_capacity(nodes.len());
+    let (mut i, mut j) = (0, low);
     loop {
-        let next = |row: &[Node], k: usize| row.get(k + 1).map_or(f64::INFINITY, |n| n.uv[0]);
-        let (a, b) = (next(low, i), next(high, j));
+        let next = |k: usize, end: usize| if k + 1 < end { nodes[k + 1].uv[0] } else { f64::INFINITY };
+        let (a, b) = (next(i, low), next(j, nodes.len()));
         if a.is_infinite() && b.is_infinite() {
             return triangles;
         }
         if a <= b {
-            triangles.push([low[i], low[i + 1], high[j]]);
+            triangles.push([i, i + 1, j]);
             i += 1;
         } else {
-            triangles.push([low[i], high[j + 1], high[j]]);
+            triangles.push([i, j + 1, j]);
             j += 1;
         }
     }
@@ -332,17 +353,27 @@ fn shaken(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     points.iter().enumerate().map(place).collect()
 }
 
-/// Adds a triangle given counter-clockwise in the chart; one with two corners at a pole is no triangle.
-fn add_triangle(solid: &Solid, face: usize, chart: &Chart, [a, b, c]: [Node; 3], mesh: &mut TriMesh) {
-    if a.id == b.id || b.id == c.id || c.id == a.id {
-        return;
-    }
+/// Adds triangles of nodes, counter-clockwise in the chart; one with two corners at a pole is no triangle.
+fn add_triangles(
+    solid: &Solid,
+    face: usize,
+    chart: &Chart,
+    nodes: &[Node],
+    triangles: Vec<[usize; 3]>,
+    mesh: &mut TriMesh,
+) {
     let Face { outward, .. } = solid.faces[face];
-    let corners = if outward { [a, b, c] } else { [a, c, b] };
     let sense = if outward { 1.0 } else { -1.0 };
-    mesh.triangles.push(corners.map(|n| n.id));
-    mesh.normals.push(corners.map(|n| chart.normal(n.uv) * sense));
-    mesh.faces.push(face as u32);
+    let normals: Vec<Vector3<f64>> = nodes.iter().map(|n| chart.normal(n.uv) * sense).collect();
+    for [a, b, c] in triangles {
+        let corners = if outward { [a, b, c] } else { [a, c, b] };
+        let ids = corners.map(|i| nodes[i].id);
+        if ids[0] != ids[1] && ids[1] != ids[2] && ids[2] != ids[0] {
+            mesh.triangles.push(ids);
+            mesh.normals.push(corners.map(|i| normals[i]));
+            mesh.faces.push(face as u32);
+        }
+    }
 }
 
 /// Triangles, counter-clockwise, to the left of the border; `None` when it crosses itself.

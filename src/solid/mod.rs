@@ -13,6 +13,7 @@ mod border;
 mod brep;
 mod corner;
 mod csg;
+mod flat;
 mod intersect;
 mod locus;
 mod measure;
@@ -25,6 +26,7 @@ mod ring;
 mod roots;
 mod surface;
 mod tolerance;
+mod touching;
 mod trace;
 mod traced;
 
@@ -46,22 +48,30 @@ pub use region::Counts;
 pub fn evaluate(part: &Part, values: &Values, quality: &Quality) -> Result<Solid, Vec<Diagnostic>> {
     let mut tree = csg::Tree::build(part, values)?;
     let arrangement = arrange::arrange(&tree)?;
-    let mut outcome = close(&mut tree, &arrangement, quality);
-    // Chords of curves that come near each other, or touch, may cross where the curves do not: shorter ones do not.
+    closed(&mut tree, &arrangement, quality)
+}
+
+/// Faces and triangles, with finer chords where those asked for are too coarse.
+fn closed(
+    tree: &mut csg::Tree,
+    arrangement: &arrange::Arrangement,
+    quality: &Quality,
+) -> Result<Solid, Vec<Diagnostic>> {
+    let mut outcome = close(tree, arrangement, quality);
+    // Chords of curves that come near each other may cross where the curves do not: shorter ones do not.
     for (chord, angle) in FINER {
         if !matches!(outcome, Err(brep::Failure::Coarse(_))) {
             break;
         }
         let finer = Quality { chord: quality.chord * chord, angle: quality.angle * angle };
-        outcome = close(&mut tree, &arrangement, &finer).or(outcome);
+        outcome = close(tree, arrangement, &finer).or(outcome);
     }
     outcome.map_err(|failure| match failure {
         brep::Failure::Certain(faults) | brep::Failure::Coarse(faults) => faults,
     })
 }
 
-/// Shares of the quality that are tried when chords are too coarse for a part. The first changes the samples of about half of
-/// all circles, so that two that touch get chords of different angles.
+/// Shares of the quality that are tried when chords are too coarse for a part.
 const FINER: [(f64, f64); 3] = [(0.5, 1.0), (0.25, 0.5), (0.03, 0.5)];
 
 /// Faces and triangles.

@@ -212,6 +212,19 @@ impl Ring {
         self.segments().filter_map(crossing).max_by(f64::total_cmp)
     }
 
+    /// Where a ring can be crossed at all.
+    pub fn reach(&self) -> Reach {
+        let mut reach = Reach { u: [f64::INFINITY, f64::NEG_INFINITY], lowest: f64::INFINITY, period: self.period };
+        for (a, b) in self.segments() {
+            reach.u = [reach.u[0].min(a[0]).min(b[0]), reach.u[1].max(a[0]).max(b[0])];
+            reach.lowest = reach.lowest.min(a[1]).min(b[1]);
+        }
+        if self.height > 0.0 {
+            reach.lowest = f64::NEG_INFINITY;
+        }
+        reach
+    }
+
     /// The ring moved along v, where that is periodic, to the first place above `low`.
     pub fn above(&self, low: &Ring) -> Ring {
         let mut ring = self.clone();
@@ -228,6 +241,24 @@ impl Ring {
     /// The ring moved by whole periods.
     pub fn shifted(&self, by: [f64; 2]) -> Vec<Node> {
         self.nodes.iter().map(|n| Node { uv: [n.uv[0] + by[0], n.uv[1] + by[1]], id: n.id }).collect()
+    }
+}
+
+/// The stretch of u a ring lies over, and its least v, so that rays need not be tried on rings far away.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reach {
+    u: [f64; 2],
+    lowest: f64,
+    period: f64,
+}
+
+impl Reach {
+    /// Whether a ray down from `p` may cross the ring.
+    pub fn may_cross(&self, p: [f64; 2]) -> bool {
+        let off = p[0] - self.u[0];
+        let off =
+            if self.period > 0.0 { (off + tolerance::WELD).rem_euclid(self.period) } else { off + tolerance::WELD };
+        (0.0..=self.u[1] - self.u[0] + 2.0 * tolerance::WELD).contains(&off) && self.lowest <= p[1] + tolerance::WELD
     }
 }
 

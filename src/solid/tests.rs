@@ -1,5 +1,6 @@
 //! Solids against closed forms and the reference figures of an independent modeller.
 
+mod fault;
 mod oblique;
 mod random;
 mod wheel;

@@ -9,9 +9,8 @@
 //! assembly may stand, and as many of the watched components as possible are seen at all.
 
 use super::item_buffer::{ItemBuffer, PixelGrid};
-use super::nodes::{Seen, seen};
+use super::nodes::{Seen, seen_on_grid};
 use crate::assembly::contact::FaceRef;
-use crate::assembly::error_tree::ErrorTree;
 use crate::design::model::{CameraPlacing, Design, Station};
 use crate::diag::Diagnostic;
 use crate::runtime::camera::Camera;
@@ -21,7 +20,7 @@ use crate::units::Range;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
 /// A component or surface seen in fewer pixels than this is not seen: a 4 × 4 px patch is the least a gradient fits in.
@@ -71,22 +70,16 @@ pub struct Choice {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// The faces of the error trees, each once. A face of a root weighs 1, of every level below half of the one above, because
-/// the further an error has to spread the less it shows.
-pub fn targets(trees: &[ErrorTree]) -> Vec<Target> {
-    let mut levels: BTreeMap<FaceRef, u32> = BTreeMap::new();
-    for node in trees.iter().flat_map(|tree| &tree.nodes) {
-        for &face in &node.surfaces {
-            let level = levels.entry(face).or_insert(node.level);
-            *level = node.level.min(*level);
-        }
-    }
-    let target = |(at, level): (FaceRef, u32)| Target {
+/// The faces of the error trees, each once, from the highest level at which they stand
+/// ([`levels`](crate::assembly::error_tree::levels)). A face of a root weighs 1, of every level below half of the one above,
+/// because the further an error has to spread the less it shows.
+pub fn targets(levels: &BTreeMap<FaceRef, u32>) -> Vec<Target> {
+    let target = |(at, level): (&FaceRef, &u32)| Target {
         component: at.component,
         face: at.face as u32,
-        weight: 0.5f64.powi(level as i32),
+        weight: 0.5f64.powi(*level as i32),
     };
-    levels.into_iter().map(target).collect()
+    levels.iter().map(target).collect()
 }
 
 /// Chooses the station's camera; a fixed one is scored and checked as a choice of one.
@@ -100,7 +93,8 @@ pub fn choose(design: &Design, station: &Station, bodies: &[Body], targets: &[Ta
     };
     let best = best(&table);
     let camera = build::camera(&station.camera, table[best].placing);
-    let seen = seen(bodies, &camera, &ItemBuffer::of(bodies, &camera));
+    let grid = PixelGrid::of(&camera);
+    let seen = seen_on_grid(bodies, &camera, &ItemBuffer::on_grid(bodies, &camera, &grid), &grid);
     let diagnostics = unseen(design, station, &table, &seen);
     Choice { best, table, camera, seen, diagnostics }
 }
@@ -123,7 +117,8 @@ impl<'a> Search<'a> {
         let reduction = (station.camera.image[0] / SEARCH_WIDTH).max(1);
         let anywhere = Placed { distance: 1.0, elevation: 0.0, azimuth: 0.0 };
         let grid = PixelGrid::of(&build::camera(&station.camera, anywhere).reduced(reduction));
-        let extremes = extremes(station, bodies.iter().filter(|body| watched.contains(&body.component)));
+        let set: BTreeSet<usize> = watched.iter().copied().collect();
+        let extremes = extremes(station, bodies.iter().filter(|body| set.contains(&body.component)));
         Search { station, bodies, targets, watched, extremes, reduction, grid }
     }
 
@@ -153,11 +148,13 @@ impl<'a> Search<'a> {
         let counts = buffer.counts();
         let area = self.reduction * self.reduction;
         let of_target = |t: &Target| area * counts.get(&(t.component, t.face)).copied().unwrap_or(0);
+        let of_component =
+            |component: usize| counts.range((component, 0)..=(component, u32::MAX)).map(|c| c.1).sum::<u32>();
         let worth = |t: &Target| t.weight * (f64::from(of_target(t)) / f64::from(LEAST_PIXELS)).ln_1p();
         Scored {
             placing,
             framed: self.extremes.iter().all(|p| inside(&camera, p)),
-            watched: self.watched.iter().map(|&component| area * buffer.pixels(component)).collect(),
+            watched: self.watched.iter().map(|&component| area * of_component(component)).collect(),
             surfaces: self.targets.iter().filter(|t| of_target(t) >= LEAST_PIXELS).count() as u32,
             pixels: self.targets.iter().map(of_target).sum(),
             score: self.targets.iter().map(worth).sum(),
@@ -252,10 +249,11 @@ fn inside(camera: &Camera, p: &Point3<f64>) -> bool {
 
 /// E0601: a watched component that the chosen camera, at full size, does not see.
 fn unseen(design: &Design, station: &Station, table: &[Scored], seen: &[Seen]) -> Vec<Diagnostic> {
+    let of_component: BTreeMap<usize, &Seen> = seen.iter().map(|s| (s.component, s)).collect();
     let watch = design.inspect.watch.iter().enumerate();
     let hidden = watch.filter_map(|(i, watch)| {
-        let found = seen.iter().find(|s| s.component == watch.component)?;
-        (found.visible_pixels < LEAST_PIXELS).then_some((i, found))
+        let found = of_component.get(&watch.component)?;
+        (found.visible_pixels < LEAST_PIXELS).then_some((i, *found))
     });
     hidden.map(|(i, found)| report(design, station, table, (i, found))).collect()
 }
@@ -294,7 +292,6 @@ fn describe(view: &Scored, watch: usize) -> String {
 mod tests {
     use super::super::shapes::{block, body, placed};
     use super::*;
-    use crate::assembly::error_tree::TreeNode;
     use crate::design::model::{CameraSpec, Component, Inspect, PoseExpr, Response, Train, Watch};
     use crate::diag::Span;
 
@@ -374,18 +371,12 @@ mod tests {
     }
 
     #[test]
-    fn a_face_in_several_trees_counts_once_at_its_highest_level() {
+    fn a_face_weighs_less_the_lower_it_stands() {
         let face = |component, face| FaceRef { component, face };
-        let node = |component, level, surfaces| TreeNode { component, parent: None, level, surfaces };
-        let tree = |nodes| ErrorTree { nodes, dashed: Vec::new() };
-        let trees = [
-            tree(vec![node(1, 0, vec![face(1, 2)]), node(0, 1, vec![face(0, 5)]), node(2, 2, vec![face(2, 0)])]),
-            tree(vec![node(2, 0, vec![face(2, 0), face(2, 1)]), node(0, 1, vec![face(0, 5)])]),
-        ];
-        let weights: Vec<f64> = targets(&trees).iter().map(|t| t.weight).collect();
-        let faces: Vec<(usize, u32)> = targets(&trees).iter().map(|t| (t.component, t.face)).collect();
-        assert_eq!(faces, [(0, 5), (1, 2), (2, 0), (2, 1)]);
-        assert_eq!(weights, [0.5, 1.0, 1.0, 1.0]);
+        let levels = BTreeMap::from([(face(2, 0), 0), (face(1, 2), 2), (face(0, 5), 1)]);
+        let weights: Vec<(usize, u32, f64)> =
+            targets(&levels).iter().map(|t| (t.component, t.face, t.weight)).collect();
+        assert_eq!(weights, [(0, 5, 0.5), (1, 2, 0.25), (2, 0, 1.0)]);
     }
 
     #[test]

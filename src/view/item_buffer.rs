@@ -5,6 +5,7 @@
 
 use super::raster::Canvas;
 pub use super::raster::PixelGrid;
+pub(super) use super::raster::Stamps;
 use crate::runtime::camera::{Camera, Vec3, dot};
 use crate::scene::Body;
 use std::collections::BTreeMap;
@@ -39,6 +40,54 @@ pub struct PixelBox {
     pub y1: u32,
 }
 
+impl PixelBox {
+    /// The smallest rectangle round both.
+    pub(super) fn around(&self, other: &PixelBox) -> PixelBox {
+        PixelBox {
+            x0: self.x0.min(other.x0),
+            y0: self.y0.min(other.y0),
+            x1: self.x1.max(other.x1),
+            y1: self.y1.max(other.y1),
+        }
+    }
+}
+
+/// A stretch of a row in which one face is seen.
+struct Run {
+    component: usize,
+    face: u32,
+    y: u32,
+    x0: u32,
+    x1: u32,
+}
+
+impl Run {
+    fn stretch(&self) -> PixelBox {
+        PixelBox { x0: self.x0, y0: self.y, x1: self.x1, y1: self.y + 1 }
+    }
+}
+
+/// What a body covers of the image as if it stood alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Footprint {
+    /// The smallest rectangle round it; `None` outside the image.
+    pub frame: Option<PixelBox>,
+    pub pixels: u32,
+}
+
+impl Footprint {
+    pub(super) fn of(body: &Body, camera: &Camera, stamps: &mut Stamps) -> Footprint {
+        let (width, mut footprint) = (camera.size[0] as usize, Footprint::default());
+        stamps.cover(body, camera, |i| {
+            let (x, y) = ((i % width) as u32, (i / width) as u32);
+            let pixel = PixelBox { x0: x, y0: y, x1: x + 1, y1: y + 1 };
+            footprint.frame = Some(footprint.frame.map_or(pixel, |frame| frame.around(&pixel)));
+            footprint.pixels += 1;
+        });
+        footprint
+    }
+}
+
 impl ItemBuffer {
     /// What `camera` sees of the bodies.
     pub fn of(bodies: &[Body], camera: &Camera) -> ItemBuffer {
@@ -54,37 +103,58 @@ impl ItemBuffer {
         ItemBuffer {
             width: grid.width,
             height: grid.height,
-            id: canvas.item.iter().map(|item| item[0]).collect(),
-            face: canvas.item.iter().map(|item| item[1]).collect(),
             depth: canvas.depth.iter().map(|&z| z as f32).collect(),
+            id: canvas.id,
+            face: canvas.face,
         }
     }
 
     /// Pixels of every (component, face) that is seen at all.
     pub fn counts(&self) -> BTreeMap<(usize, u32), u32> {
         let mut counts = BTreeMap::new();
-        let mut start = 0;
-        // Neighbours along a row mostly see the same face: one entry per run, not per pixel.
-        for end in 1..=self.id.len() {
-            if end < self.id.len() && self.id[end] == self.id[start] && self.face[end] == self.face[start] {
-                continue;
-            }
-            if self.id[start] != 0 {
-                *counts.entry((self.id[start] as usize - 1, self.face[start])).or_insert(0) += (end - start) as u32;
-            }
-            start = end;
-        }
+        self.runs().for_each(|run| *counts.entry((run.component, run.face)).or_insert(0) += run.x1 - run.x0);
         counts
+    }
+
+    /// The smallest rectangles round the visible parts of all components that are seen at all.
+    pub fn boxes(&self) -> BTreeMap<usize, PixelBox> {
+        let mut boxes: BTreeMap<usize, PixelBox> = BTreeMap::new();
+        for run in self.runs() {
+            let stretch = run.stretch();
+            boxes.entry(run.component).and_modify(|b| *b = b.around(&stretch)).or_insert(stretch);
+        }
+        boxes
     }
 
     /// Number of pixels in which the component is seen.
     pub fn pixels(&self, component: usize) -> u32 {
-        self.id.iter().filter(|&&id| id as usize == component + 1).count() as u32
+        self.runs().filter(|run| run.component == component).map(|run| run.x1 - run.x0).sum()
     }
 
     /// The smallest rectangle round the visible part of the component; `None` where it is not seen.
     pub fn bbox(&self, component: usize) -> Option<PixelBox> {
-        self.mask(component).bbox()
+        let own = self.runs().filter(|run| run.component == component).map(|run| run.stretch());
+        own.reduce(|all, stretch| all.around(&stretch))
+    }
+
+    /// Row by row the stretches in which one face is seen: neighbours along a row mostly see the same one.
+    fn runs(&self) -> impl Iterator<Item = Run> + '_ {
+        (0..self.height).flat_map(|y| {
+            let row = y * self.width..(y + 1) * self.width;
+            let (id, face) = (&self.id[row.clone()], &self.face[row]);
+            let mut x = 0;
+            std::iter::from_fn(move || {
+                while id.get(x) == Some(&0) {
+                    x += 1;
+                }
+                let item = (*id.get(x)?, face[x]);
+                let start = x;
+                while x < id.len() && (id[x], face[x]) == item {
+                    x += 1;
+                }
+                Some(Run { component: item.0 as usize - 1, face: item.1, y: y as u32, x0: start as u32, x1: x as u32 })
+            })
+        })
     }
 
     /// The pixels in which the component is seen.

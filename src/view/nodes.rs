@@ -3,7 +3,7 @@
 //!
 //! In: bodies, a camera and its [`ItemBuffer`]. Out: one [`Seen`] per body; masks. Never decides what a node is.
 
-use super::item_buffer::{ItemBuffer, Mask, PixelBox, PixelGrid};
+use super::item_buffer::{Footprint, ItemBuffer, Mask, PixelBox, PixelGrid, Stamps};
 use crate::runtime::camera::Camera;
 use crate::scene::Body;
 use rayon::prelude::*;
@@ -28,22 +28,26 @@ pub struct Seen {
 
 /// What `camera` sees of each body; `buffer` is its item buffer of all of them.
 pub fn seen(bodies: &[Body], camera: &Camera, buffer: &ItemBuffer) -> Vec<Seen> {
-    let grid = PixelGrid::of(camera);
-    let counts = buffer.counts();
-    let look = |body: &Body| {
-        let alone = ItemBuffer::on_grid(std::slice::from_ref(body), camera, &grid);
+    seen_on_grid(bodies, camera, buffer, &PixelGrid::of(camera))
+}
+
+/// The same with a grid made before by [`PixelGrid::of`] the camera.
+pub(super) fn seen_on_grid(bodies: &[Body], camera: &Camera, buffer: &ItemBuffer, grid: &PixelGrid) -> Vec<Seen> {
+    let (counts, boxes) = (buffer.counts(), buffer.boxes());
+    let look = |stamps: &mut Stamps, body: &Body| {
+        let alone = Footprint::of(body, camera, stamps);
         let own = counts.range((body.component, 0)..=(body.component, u32::MAX));
         let faces: Vec<(u32, u32)> = own.map(|(&(_, face), &pixels)| (face, pixels)).collect();
         Seen {
             component: body.component,
-            full: alone.bbox(body.component),
-            visible: buffer.bbox(body.component),
-            full_pixels: alone.pixels(body.component),
+            full: alone.frame,
+            visible: boxes.get(&body.component).copied(),
+            full_pixels: alone.pixels,
             visible_pixels: faces.iter().map(|&(_, pixels)| pixels).sum(),
             faces,
         }
     };
-    bodies.par_iter().map(look).collect()
+    bodies.par_iter().map_init(|| Stamps::new(grid), look).collect()
 }
 
 /// Visible pixels of the components asked for; 0 for one that has no body.

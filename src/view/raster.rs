@@ -1,6 +1,6 @@
 //! The scanline rasteriser behind the item buffer.
 //!
-//! In: bodies and a camera's [`PixelGrid`]. Out: item and depth of every pixel. Never shades.
+//! In: bodies and a camera's [`PixelGrid`]. Out: item and depth of every pixel, or the pixels of each body alone. Never shades.
 //!
 //! Homogeneous coordinates (Olano and Greer 1997, "Triangle scan conversion using 2D homogeneous coordinates"): with the
 //! camera at the origin, the ray (u, v, 1) passes inside the edge a → b of a triangle when (b × a) · (u, v, 1) > 0. The
@@ -50,8 +50,7 @@ impl PixelGrid {
     /// The grid of a camera; only its focal length, centre, k1 and size count.
     pub fn of(camera: &Camera) -> PixelGrid {
         let [width, height] = camera.size.map(|n| n as usize);
-        let centres = (0..height).flat_map(|y| (0..width).map(move |x| [x as f64 + 0.5, y as f64 + 0.5]));
-        let (u, v): (Vec<f64>, Vec<f64>) = centres.map(|pixel| tangents(camera, pixel)).unzip();
+        let (u, v) = directions(camera, width, height);
         let ends = |row: &[f64]| row.iter().fold([f64::MAX, f64::MIN], |[l, h], &v| [l.min(v), h.max(v)]);
         let row_v = v.chunks(width.max(1)).map(ends).collect();
         let bend = camera.k1 * (camera.focal / camera.centre[0]).powi(2);
@@ -95,11 +94,40 @@ fn seek(length: usize, guess: usize, before: impl Fn(usize) -> bool) -> usize {
     at
 }
 
-/// Tangents of the ray through a pixel: the inverse of [`Camera::project`], by Newton's method.
+/// Tangents of the rays through all pixel centres, to the right and down.
+fn directions(camera: &Camera, width: usize, height: usize) -> (Vec<f64>, Vec<f64>) {
+    let off = |k: usize, centre: f64| k as f64 + 0.5 - centre;
+    let [across, down] = [(width, 0), (height, 1)].map(|(n, axis)| {
+        let offs: Vec<f64> = (0..n).map(|k| off(k, camera.centre[axis])).collect();
+        offs
+    });
+    let (mut u, mut v) = (vec![0.0; width * height], vec![0.0; width * height]);
+    for y in 0..height {
+        let (row, mirrored) = (y * width, height - 1 - y);
+        // A lens bends alike above and below its axis, left and right of it: a quarter of the image tells all.
+        if mirrored < y && down[y] == -down[mirrored] {
+            let from = mirrored * width;
+            u.copy_within(from..from + width, row);
+            (0..width).for_each(|x| v[row + x] = -v[from + x]);
+            continue;
+        }
+        for x in 0..width {
+            let twin = width - 1 - x;
+            (u[row + x], v[row + x]) = if twin < x && across[x] == -across[twin] {
+                (-u[row + twin], v[row + twin])
+            } else {
+                tangents(camera, [across[x], down[y]])
+            };
+        }
+    }
+    (u, v)
+}
+
+/// Tangents of the ray through a place of the image, from its centre in px: the inverse of [`Camera::project`], by Newton's
+/// method.
 ///
 /// With the seen radius s and k = k1 s², the undistorted radius is t s where t + k t³ = 1.
-fn tangents(camera: &Camera, pixel: [f64; 2]) -> (f64, f64) {
-    let seen = [pixel[0] - camera.centre[0], pixel[1] - camera.centre[1]];
+fn tangents(camera: &Camera, seen: [f64; 2]) -> (f64, f64) {
     let k = (camera.k1 * (seen[0] * seen[0] + seen[1] * seen[1]) / camera.centre[0].powi(2)).max(FOLD);
     let mut t = 1.0;
     // Quadratic convergence from an error below 0.5: six rounds reach rounding for every lens short of folding.
@@ -112,34 +140,61 @@ fn tangents(camera: &Camera, pixel: [f64; 2]) -> (f64, f64) {
 /// The buffer while it is drawn: items are (1 + component, face), depth in mm.
 pub(super) struct Canvas<'a> {
     grid: &'a PixelGrid,
-    pub(super) item: Vec<[u32; 2]>,
+    pub(super) id: Vec<u32>,
+    pub(super) face: Vec<u32>,
     pub(super) depth: Vec<f64>,
 }
 
 impl<'a> Canvas<'a> {
     pub(super) fn new(grid: &'a PixelGrid) -> Self {
         let pixels = grid.width * grid.height;
-        Canvas { grid, item: vec![[0; 2]; pixels], depth: vec![f64::INFINITY; pixels] }
+        Canvas { grid, id: vec![0; pixels], face: vec![0; pixels], depth: vec![f64::INFINITY; pixels] }
     }
 
     pub(super) fn draw(&mut self, body: &Body, camera: &Camera) {
-        let to_camera = to_camera(camera) * body.pose.to_matrix();
-        let seen: Vec<Vec3> = body.mesh.positions.iter().map(|p| to_camera.transform_point(p).into()).collect();
-        for (corners, &face) in body.mesh.triangles.iter().zip(&body.mesh.faces) {
-            if let Some(triangle) = Triangle::new(corners.map(|i| seen[i as usize])) {
-                self.fill(&triangle, [1 + body.component as u32, face]);
+        let id = 1 + body.component as u32;
+        scan(self.grid, body, camera, |i, depth, face| {
+            if in_front((depth, [id, face]), (self.depth[i], [self.id[i], self.face[i]])) {
+                (self.depth[i], self.id[i], self.face[i]) = (depth, id, face);
             }
-        }
+        });
+    }
+}
+
+/// Which pixels single bodies cover, one body after the other: a pixel is never cleared, it only remembers the last body.
+pub(super) struct Stamps<'a> {
+    grid: &'a PixelGrid,
+    last: Vec<u32>,
+    bodies: u32,
+}
+
+impl<'a> Stamps<'a> {
+    pub(super) fn new(grid: &'a PixelGrid) -> Self {
+        Stamps { grid, last: vec![0; grid.width * grid.height], bodies: 0 }
     }
 
-    fn fill(&mut self, triangle: &Triangle, item: [u32; 2]) {
-        for y in self.grid.rows(triangle.v) {
-            for i in self.grid.span(y, triangle) {
-                if let Some(depth) = triangle.depth(self.grid.u[i], self.grid.v[i])
-                    && in_front((depth, item), (self.depth[i], self.item[i]))
-                {
-                    self.depth[i] = depth;
-                    self.item[i] = item;
+    /// Calls `visit` with the pixels the body covers as if it stood alone, each once.
+    pub(super) fn cover(&mut self, body: &Body, camera: &Camera, mut visit: impl FnMut(usize)) {
+        self.bodies += 1;
+        scan(self.grid, body, camera, |i, depth, _| {
+            if depth.is_finite() && self.last[i] != self.bodies {
+                self.last[i] = self.bodies;
+                visit(i);
+            }
+        });
+    }
+}
+
+/// Calls `visit` with every pixel, depth and face where a triangle of the body faces the camera.
+fn scan(grid: &PixelGrid, body: &Body, camera: &Camera, mut visit: impl FnMut(usize, f64, u32)) {
+    let to_camera = to_camera(camera) * body.pose.to_matrix();
+    let seen: Vec<Vec3> = body.mesh.positions.iter().map(|p| to_camera.transform_point(p).into()).collect();
+    for (corners, &face) in body.mesh.triangles.iter().zip(&body.mesh.faces) {
+        let Some(triangle) = Triangle::new(corners.map(|i| seen[i as usize])) else { continue };
+        for y in grid.rows(triangle.v) {
+            for i in grid.span(y, &triangle) {
+                if let Some(depth) = triangle.depth(grid.u[i], grid.v[i]) {
+                    visit(i, depth, face);
                 }
             }
         }
