@@ -104,8 +104,9 @@ fn finding(text: &mut String, finding: &Finding) {
 /// A number with at most `decimals` decimals; what is no number is null.
 fn number(text: &mut String, value: f64, decimals: i32) {
     let scale = 10f64.powi(decimals);
-    // Adding zero turns -0.0 into 0.0.
-    let rounded = (value * scale).round() / scale + 0.0;
+    // Beyond 2^52 steps a number has no decimals to lose. Adding zero turns -0.0 into 0.0.
+    let whole = (value * scale).abs() >= 4_503_599_627_370_496.0;
+    let rounded = if whole { value } else { (value * scale).round() / scale + 0.0 };
     // Writing to a string cannot fail.
     let _ = if rounded.is_finite() { write!(text, "{rounded:?}") } else { write!(text, "null") };
 }
@@ -186,7 +187,7 @@ mod tests {
             let mut text = String::new();
             number(&mut text, value, 6);
             let read: serde_json::Value = serde_json::from_str(&text).unwrap();
-            let expected = (value * 1e6).is_finite().then_some(value + 0.0);
+            let expected = value.is_finite().then_some(value + 0.0);
             assert_eq!(read.as_f64(), expected, "{text}");
         }
     }
