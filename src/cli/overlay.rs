@@ -5,6 +5,7 @@
 //! it; an X marks a mismatch: bold where a component is blamed, thin where another's fault explains it.
 
 use super::font;
+use crate::report::shrunk;
 use crate::runtime::inspect::{Decision, NodeReport, Verdict};
 use image::{DynamicImage, ImageError, ImageFormat, ImageReader, Limits, Rgb, RgbImage};
 use std::io::Cursor;
@@ -139,19 +140,6 @@ impl Pen<'_> {
             }
         }
     }
-}
-
-/// The corners moved towards the centre so that the sides come closer by about `by` px (apart if negative), but never
-/// past it.
-fn shrunk(corners: [Point; 4], by: f64) -> [Point; 4] {
-    let centre = [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / 4.0);
-    corners.map(|corner| {
-        let arm = [corner[0] - centre[0], corner[1] - centre[1]];
-        let reach = arm[0].abs().min(arm[1].abs());
-        // What is smaller than the step keeps a fifth of its size, so that it stays in sight.
-        let share = if reach > by.abs() { 1.0 - by / reach } else { 0.2 };
-        [centre[0] + arm[0] * share, centre[1] + arm[1] * share]
-    })
 }
 
 #[cfg(test)]

@@ -70,25 +70,7 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::inspect::Finding;
-    use crate::runtime::pose::Pose;
-
-    fn faulty() -> Outcome {
-        let finding = Finding {
-            component: "pin[2]".into(),
-            fault: "missing".into(),
-            error_tree: "pin[2]".into(),
-            node: "pin[2]".into(),
-            p_value: 0.0004,
-            box_px: [1.0, 2.0, 3.25, 4.0],
-        };
-        let mut outcome = Outcome::unreadable("a \"b\".png".into(), "pin[2]: missing".into());
-        outcome.verdict.decision = Decision::NoGo;
-        outcome.verdict.pose = Some(Pose { x: 1.0, y: -2.0, z: 0.0, rz: 0.1 });
-        outcome.verdict.findings.push(finding);
-        outcome.milliseconds = Some(12.3);
-        outcome
-    }
+    use crate::runtime::report::tests::faulty;
 
     #[test]
     fn junit_counts_and_escapes() {

@@ -20,6 +20,8 @@ mod templates;
 mod title;
 mod views;
 
+pub(crate) use photos::shrunk;
+
 #[cfg(test)]
 mod tests;
 

@@ -122,12 +122,14 @@ fn quad(corners: [[f64; 2]; 4], class: &str) -> String {
     format!("<polygon{class} points=\"{}\"/>", points.join(" "))
 }
 
-/// Corners moved towards the centre so that sides come closer by about `by` px (apart if negative), never past it.
-fn shrunk(corners: [[f64; 2]; 4], by: f64) -> [[f64; 2]; 4] {
+/// The corners moved towards the centre so that the sides come closer by about `by` px (apart if negative), but never
+/// past it.
+pub(crate) fn shrunk(corners: [[f64; 2]; 4], by: f64) -> [[f64; 2]; 4] {
     let centre = [0, 1].map(|i| corners.iter().map(|c| c[i]).sum::<f64>() / 4.0);
     corners.map(|corner| {
         let arm = [corner[0] - centre[0], corner[1] - centre[1]];
         let reach = arm[0].abs().min(arm[1].abs());
+        // What is smaller than the step keeps a fifth of its size, so that it stays in sight.
         let share = if reach > by.abs() { 1.0 - by / reach } else { 0.2 };
         [centre[0] + arm[0] * share, centre[1] + arm[1] * share]
     })

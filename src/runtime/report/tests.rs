@@ -1,0 +1,63 @@
+//! The JSON line: its keys, its numbers, its strings.
+
+use super::*;
+use crate::runtime::pose::Pose;
+
+/// A missing pin.
+pub(crate) fn faulty() -> Outcome {
+    let finding = Finding {
+        component: "pin[2]".into(),
+        fault: "missing".into(),
+        error_tree: "pin[2]".into(),
+        node: "pin[2]".into(),
+        p_value: 0.0004,
+        box_px: [1.0, 2.0, 3.25, 4.0],
+    };
+    let mut outcome = Outcome::unreadable("a \"b\".png".into(), "pin[2]: missing".into());
+    outcome.verdict.decision = Decision::NoGo;
+    outcome.verdict.pose = Some(Pose { x: 1.0, y: -2.0, z: 0.0, rz: 0.1 });
+    outcome.verdict.findings.push(finding);
+    outcome.milliseconds = Some(12.3);
+    outcome
+}
+
+#[test]
+fn the_json_line_keeps_its_keys_in_order() {
+    let expected = concat!(
+        r#"{"photo":"a \"b\".png","verdict":"no-go","reason":"pin[2]: missing","#,
+        r#""pose":{"x":1.0,"y":-2.0,"scale":1.0,"rotation_deg":5.7296},"#,
+        r#""findings":[{"component":"pin[2]","fault":"missing","error_tree":"pin[2]","node":"pin[2]","#,
+        r#""p_value":0.0004,"box":[1.0,2.0,3.3,4.0]}],"milliseconds":12.3}"#
+    );
+    assert_eq!(faulty().json(), expected);
+}
+
+#[test]
+fn a_photo_that_cannot_be_read_has_all_keys_too() {
+    let line = Outcome::unreadable("x.png".into(), "no".into()).json();
+    let expected =
+        r#"{"photo":"x.png","verdict":"cannot-inspect","reason":"no","pose":null,"findings":[],"milliseconds":0.0}"#;
+    assert_eq!(line, expected);
+}
+
+#[test]
+fn without_a_clock_the_time_is_null() {
+    let outcome = Outcome { milliseconds: None, ..Outcome::unreadable(String::new(), String::new()) };
+    assert!(outcome.json().ends_with(r#""milliseconds":null}"#));
+}
+
+#[test]
+fn strings_and_numbers_are_those_of_a_json_crate() {
+    for value in ["", "a\"b\\c/", "\u{0}\u{1f}\u{7f}\n\r\t", "µm 🔩"] {
+        let mut text = String::new();
+        string(&mut text, value);
+        assert_eq!(serde_json::from_str::<String>(&text).unwrap(), value);
+    }
+    for value in [0.0, -0.0, 1.0, -1.5, 1e-6, 123456.7, 1e17, 1e300, f64::MAX, f64::NAN, f64::INFINITY] {
+        let mut text = String::new();
+        number(&mut text, value, 6);
+        let read: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let expected = value.is_finite().then_some(value + 0.0);
+        assert_eq!(read.as_f64(), expected, "{text}");
+    }
+}
