@@ -20,6 +20,7 @@ mod templates;
 mod title;
 mod views;
 
+#[cfg(feature = "cli")]
 pub(crate) use photos::shrunk;
 
 #[cfg(test)]
