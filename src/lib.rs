@@ -115,9 +115,9 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
 
     line.enter(Stage::Plan)?;
     let modes = modes();
-    let (spec, datum) = (line::digest(&design), line::datum(&design, &analysis.liaison, &modes));
+    let spec = line::digest(&design);
     let tree = &assembly::error_tree::error_tree(&analysis.liaison, 0, None);
-    let job = train::Job { design: &design, station, camera, modes: &modes, tree, datum: &datum, spec };
+    let job = train::Job { design: &design, station, camera, modes: &modes, tree, spec };
     let trained = train::train(&job, &|step, done, total| line.tell(step.into(), done, total));
     let (model, doubts) = line.accept(trained)?;
     line.out.model = Some(model);

@@ -4,8 +4,7 @@
 use crate::artifacts::{self, Artifact, pictures};
 use crate::assembly::Analysis;
 use crate::assembly::error_tree::{ErrorTree, object_tree};
-use crate::assembly::fault::{self, ErrorMode, FaultKind};
-use crate::assembly::liaison::Liaison;
+use crate::assembly::fault::ErrorMode;
 use crate::assembly::piece::Workshop;
 use crate::assembly::place::place;
 use crate::design::Loaded;
@@ -286,17 +285,6 @@ pub(crate) fn bodies(design: &Design, station: &Station, solids: &[Arc<Solid>]) 
         finishes: design.components.iter().map(|c| finish(c.part)).collect(),
     };
     build::bodies(&instance, shots::standing(station).map(|[low, high]| (low + high) / 2.0))
-}
-
-/// Per component: no misplaced part takes it along or hides it, so it may serve to locate the assembly. A component that is
-/// missing or stands too high does not mislead: its edges are few among many.
-pub(crate) fn datum(design: &Design, liaison: &Liaison, modes: &[ErrorMode]) -> Vec<bool> {
-    let mut firm = vec![true; design.components.len()];
-    for mode in modes.iter().filter(|m| m.kind == FaultKind::Misplaced) {
-        let kept = fault::datum(liaison, mode);
-        firm.iter_mut().enumerate().for_each(|(c, firm)| *firm &= kept.contains(&c));
-    }
-    firm
 }
 
 /// Digest of the design as resolved: layout and comments of the spec do not count, overridden values do.

@@ -7,8 +7,8 @@
 use super::insertion::Insertion;
 use super::liaison::Liaison;
 use super::place::place;
-use super::turn::{Turn, turns};
-use crate::design::model::Design;
+use super::turn::{Turn, Turning, turns};
+use crate::design::model::{Design, Expr};
 use crate::solid::{Solid, Surface};
 use nalgebra::{Isometry3, Translation3, Unit, Vector3};
 use serde::Serialize;
@@ -44,7 +44,7 @@ pub enum Motion {
         from: f64,
         to: f64,
     },
-    /// Turned out of its seat, resting on what blocks it.
+    /// Turned out of its seat, resting on what blocks it, or turned into another seat.
     Turn(Turn),
     /// The part of another component, with that component's name.
     Replace {
@@ -90,9 +90,11 @@ pub fn modes(design: &Design, liaison: &Liaison, insertion: &Insertion, solids: 
     let watched = design.inspect.watch.iter().map(|w| w.component).filter(|c| *c != 0);
     let of_one = |component: usize| {
         let slide = slide(liaison, insertion, component).map(|m| (FaultKind::NotSeated, m));
-        let turn = turns(liaison, insertion, component, SMALLEST, solids, &poses);
-        let turn = turn.map(|t| (FaultKind::Misplaced, Motion::Turn(t)));
-        let motions = [(FaultKind::Missing, Motion::Remove)].into_iter().chain(slide).chain(turn);
+        let zone = turn_zone(design, component);
+        let turning = zone.map(|zone| Turning { component, insertion, liaison, solids, poses: &poses, zone });
+        let turns = turning.map(|of| turns(&of, SMALLEST)).unwrap_or_default();
+        let turns = turns.into_iter().map(|t| (FaultKind::Misplaced, Motion::Turn(t)));
+        let motions = [(FaultKind::Missing, Motion::Remove)].into_iter().chain(slide).chain(turns);
         motions.map(move |(kind, motion)| ErrorMode { component, kind, motion }).collect::<Vec<_>>()
     };
     watched.flat_map(of_one).collect()
@@ -116,15 +118,6 @@ pub fn wrong_parts(design: &Design, liaison: &Liaison, solids: &[Arc<Solid>]) ->
     watched.flat_map(of_one).collect()
 }
 
-/// Components that a mode neither moves nor hides: what the assembly can be located by while the fault is sought.
-pub fn datum(liaison: &Liaison, mode: &ErrorMode) -> Vec<usize> {
-    let hidden = match mode.kind {
-        FaultKind::Misplaced => liaison.neighbours(mode.component),
-        _ => &[],
-    };
-    (0..liaison.components).filter(|c| *c != mode.component && !hidden.contains(c)).collect()
-}
-
 /// The fault at a size: `u` in 0..1 picks it within the mode's range (`u[0]` the size; `u[1]` how far loose components give
 /// way under a misplaced part). `solids` and `poses` hold one entry per component, of the same draw.
 pub fn apply(mode: &ErrorMode, u: [f64; 3], solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Faulted {
@@ -139,7 +132,8 @@ pub fn apply(mode: &ErrorMode, u: [f64; 3], solids: &[Arc<Solid>], poses: &[Isom
         }
         Motion::Turn(turn) => {
             let settled = turn.settle(mode.component, u, solids, poses);
-            let text = format!("turned {:.1} deg and lifted {:.1} mm", settled.angle.to_degrees(), settled.lift);
+            let turned = format!("turned {:.1} deg", settled.angle.to_degrees());
+            let text = if turn.seated { turned } else { format!("{turned} and lifted {:.1} mm", settled.lift) };
             Faulted { size: settled.angle, pushed: settled.pushed, ..still(settled.pose, &text) }
         }
         Motion::Replace { by, name } => {
@@ -150,6 +144,17 @@ pub fn apply(mode: &ErrorMode, u: [f64; 3], solids: &[Arc<Solid>], poses: &[Isom
 
 fn still(pose: Isometry3<f64>, text: &str) -> Faulted {
     Faulted { pose: Some(pose), solid: None, pushed: Vec::new(), size: 0.0, text: text.to_string() }
+}
+
+/// Half the tolerance of a component's angle about its own axes (rad); `None` if some turn is free: no angle is wrong.
+fn turn_zone(design: &Design, component: usize) -> Option<f64> {
+    let placed = &design.components[component];
+    let half = |turn: &Expr| match turn {
+        Expr::Dim(id) => design.dims[id.0 as usize].range.half_width(),
+        _ => 0.0,
+    };
+    let free = placed.free[3..].contains(&true);
+    (!free).then(|| placed.pose.r.iter().map(half).fold(0.0, f64::max))
 }
 
 /// Short of its seat: for a component that sits in or on others along its removal direction.
@@ -267,16 +272,10 @@ mod tests {
     #[test]
     fn a_misplaced_wheel_says_how_it_lies() {
         let (a, _, modes) = wheel();
-        let mode = modes.iter().find(|m| m.kind == FaultKind::Misplaced).expect("wheel_a2");
+        let misplaced = |m: &&ErrorMode| m.kind == FaultKind::Misplaced && m.component == WHEEL_A2;
+        let mode = modes.iter().find(misplaced).expect("wheel_a2");
         let faulted = apply(mode, [1.0, 1.0, 0.0], &a.solids, &place(&a.design, &a.design.nominal()));
         assert_eq!(faulted.text, "turned 40.0 deg and lifted 2.6 mm");
         assert!((faulted.size.to_degrees() - 40.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn a_turned_wheel_is_no_datum_and_neither_are_its_pins() {
-        let (_, liaison, modes) = wheel();
-        let mode = modes.iter().find(|m| m.kind == FaultKind::Misplaced).expect("wheel_a2");
-        assert_eq!(datum(&liaison, mode), [0, 1, 2, 3]);
     }
 }

@@ -5,7 +5,7 @@
 //! mass: the facet above that centre of the upper convex hull of D(u, v), the top of what stands below less the underside
 //! of the part. The tilt is taken as small: D is that of the part before it tilts.
 
-use super::columns::{Columns, Extent, Frame, Grid, project};
+use super::columns::{Columns, Extent, Frame, Grid, erode, project};
 use crate::solid::{Solid, TriMesh};
 use nalgebra::{Isometry3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::sync::Arc;
@@ -60,6 +60,8 @@ pub(crate) struct Bed {
     loose: Vec<(usize, Vec<f64>)>,
 }
 
+/// Material that enters other material by more than this (mm) has no place there.
+const ENTERS: f64 = 0.1;
 /// Most cells across a bed, whatever the side of a cell that is asked for.
 const MOST_CELLS: f64 = 400.0;
 /// A part that would have to tilt more than this (rad) slides off.
@@ -105,9 +107,25 @@ impl Bed {
         let points = project(mesh, pose, &self.frame);
         let columns = Columns::new(mesh, &points, &self.grid);
         let undersides = (0..self.grid.cells()).map(|c| columns.bottom(c).unwrap_or(f64::INFINITY)).collect();
+        let tops = (0..self.grid.cells()).map(|c| columns.top(c).unwrap_or(f64::NEG_INFINITY)).collect();
         let level = points.iter().map(|p| p[2]).fold(f64::INFINITY, f64::min);
-        Landing { bed: self, undersides, centre: centre_of_mass(&columns, &self.grid), level }
+        Landing { bed: self, undersides, tops, centre: centre_of_mass(&columns, &self.grid), level }
     }
+
+    /// Whether two placed meshes keep out of each other, but for what is as narrow as facets.
+    pub fn clear(&self, a: &TriMesh, at: &Isometry3<f64>, b: &TriMesh, there: &Isometry3<f64>) -> bool {
+        let columns = |mesh: &TriMesh, pose| Columns::new(mesh, &project(mesh, pose, &self.frame), &self.grid);
+        let (p, q) = (columns(a, at), columns(b, there));
+        let enters = |cell: usize| overlap(p.spans(cell), q.spans(cell)) > ENTERS;
+        let marked: Vec<bool> = (0..self.grid.cells()).map(enters).collect();
+        !erode(&marked, &self.grid).contains(&true)
+    }
+}
+
+/// How deep two intervals of material enter each other at most (mm).
+fn overlap(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
+    let pairs = a.iter().flat_map(|p| b.iter().map(move |q| p[1].min(q[1]) - p[0].max(q[0])));
+    pairs.fold(0.0, f64::max)
 }
 
 fn raise(heights: &mut [f64], tops: &[f64]) {
@@ -129,6 +147,8 @@ pub(crate) struct Landing<'a> {
     bed: &'a Bed,
     /// Per cell; infinity where the part has no material.
     undersides: Vec<f64>,
+    /// Per cell; -infinity where the part has no material.
+    tops: Vec<f64>,
     centre: [f64; 2],
     /// Height of the part's lowest point.
     pub level: f64,
@@ -146,6 +166,14 @@ impl Landing<'_> {
         };
         let points: Vec<[f64; 3]> = over_something.map(point).collect();
         supporting_plane(&points, self.centre).filter(|lie| lie.tilt() <= STEEPEST)
+    }
+
+    /// Whether another pose of the part, set down on the same bed, shows a surface higher or lower by more than `step`
+    /// (mm) somewhere, seen along the direction. What is as narrow as facets does not count.
+    pub fn looks_unlike(&self, other: &Landing, step: f64) -> bool {
+        let differs = |(a, b): (&f64, &f64)| a != b && (a - b).abs() > step;
+        let marked: Vec<bool> = self.tops.iter().zip(&other.tops).map(differs).collect();
+        erode(&marked, &self.bed.grid).contains(&true)
     }
 
     /// How far each loose body is pushed down by the part at a lie: (component, mm).

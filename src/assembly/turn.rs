@@ -1,14 +1,15 @@
-//! A part put on its pins at the wrong angle.
+//! A part put in at the wrong angle.
 //!
-//! In: a component held against turning, its liaisons, the solids. Out: the turns that keep it from its seat and, for a turn
-//! and a draw of the assembly, where it then lies. Components that stand on nothing firm (pins held by their sides alone)
-//! may be pushed down by it; the others stay.
+//! In: a component whose angle matters, the solids, the removal order. Out: the turns that keep it from its seat, those at
+//! which it finds another one and looks different, and, for a turn and a draw of the assembly, where it then lies.
+//! Components that stand on nothing firm (pins held by their sides alone) may be pushed down by it; the others stay.
+//! Decided by setting the turned part down on the solids, so a part held by loose pegs is as good as one held by a fit.
 
 use super::columns::Frame;
 use super::insertion::Insertion;
 use super::liaison::Liaison;
-use super::rest::{Bed, Lie};
-use crate::solid::{Solid, Surface};
+use super::rest::{Bed, Landing, Lie};
+use crate::solid::{Face, Solid, Surface};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -21,10 +22,12 @@ pub struct Turn {
     pub point: [f64; 3],
     /// The axis, towards where the component is removed.
     pub direction: [f64; 3],
-    /// Angles (rad), low to high, at which it does not find its seat.
+    /// Angles (rad), low to high.
     pub ranges: Vec<[f64; 2]>,
     /// Components that bear it; the others give way.
     pub firm: Vec<usize>,
+    /// At these angles it finds a seat and lies as low as it should; else it lies on what keeps it out.
+    pub seated: bool,
 }
 
 /// Where a turned component lies.
@@ -38,47 +41,139 @@ pub(crate) struct Settled {
     pub lift: f64,
 }
 
-/// Turns are looked for up to this angle (rad), or half the period of the seats if that is less.
+/// Turns out of the seat are looked for up to this angle (rad).
 const WIDEST: f64 = 40.0 * TAU / 360.0;
 /// Turns are tried in steps of this (rad), and the first that lifts the part is found to within a sixteenth of it.
 const STEP: f64 = 4.0 * TAU / 360.0;
 /// Side of a cell (mm) in the search for turns and in the pose a turn leads to.
 const COARSE: f64 = 0.4;
 const FINE: f64 = 0.2;
-/// Contacts closer to the axis than this (mm) do not stop a turn.
-const ON_AXIS: f64 = 0.5;
+/// Patterns repeat after a whole turn divided by one of these: there a part may find another seat.
+const REPEATS: [u32; 6] = [2, 3, 4, 5, 6, 8];
+/// A part that lies lower than this over its seat (mm) is in it.
+const IN_SEAT: f64 = 0.1;
+/// A turned part looks different where its surface is higher or lower by more than this (mm).
+const DIFFERENT: f64 = 0.3;
+/// A part without anything that keeps it from turning is misplaced from this angle on (rad), or from this many times the
+/// half width of its tolerance.
+const PLAIN: f64 = 5.0 * TAU / 360.0;
+const PLAIN_ZONES: f64 = 3.0;
 /// Directions that differ by less than this sine are parallel.
 const PARALLEL: f64 = 1e-3;
+/// Axes nearer to each other than this (mm) are one.
+const SAME_AXIS: f64 = 0.05;
 /// The axis of a part lies within this share of the part's reach from its middle.
 const CENTRAL: f64 = 0.25;
 
-/// The turns that lift a component by `least` mm or more. `None` for one that nothing stops from turning, that would find
-/// its seat at any angle, or that others hold down: its error shows as theirs.
-pub(crate) fn turns(
-    liaison: &Liaison,
-    insertion: &Insertion,
-    component: usize,
-    least: f64,
-    solids: &[Arc<Solid>],
-    poses: &[Isometry3<f64>],
-) -> Option<Turn> {
-    let direction = insertion.direction(component);
-    let axis = Axis::of(&solids[component], &poses[component], direction);
-    let seats = seats(liaison, component, &axis);
-    if seats.is_empty() || !insertion.is_free(component) {
-        return None;
+/// Whose turns are asked for, and among what.
+pub(crate) struct Turning<'a> {
+    pub component: usize,
+    pub insertion: &'a Insertion,
+    pub liaison: &'a Liaison,
+    /// One per component, at nominal.
+    pub solids: &'a [Arc<Solid>],
+    pub poses: &'a [Isometry3<f64>],
+    /// Half width of the tolerance of its angle (rad).
+    pub zone: f64,
+}
+
+/// The turns that lift a component by `least` mm or more, and those at which it finds another seat and looks different.
+/// A part that others hold down can only be in another seat: were it lifted, its error would show as theirs.
+pub(crate) fn turns(of: &Turning, least: f64) -> Vec<Turn> {
+    let direction = of.insertion.direction(of.component);
+    let axes = Axis::candidates(&of.solids[of.component], &of.poses[of.component], direction);
+    let trials: Vec<Trial> = axes.iter().map(|axis| Trial::new(of, *axis)).collect();
+    let free = of.insertion.is_free(of.component);
+    let lifted = trials.iter().filter(|_| free).find_map(|t| t.turn(t.lifted(least), false));
+    let plain = free && lifted.is_none();
+    let seated = trials.iter().find_map(|t| t.turn(t.seats(plain), true));
+    lifted.into_iter().chain(seated).collect()
+}
+
+/// A component turned about one axis.
+struct Trial<'a> {
+    of: &'a Turning<'a>,
+    axis: Axis,
+    firm: Vec<usize>,
+    bed: Bed,
+}
+
+impl<'a> Trial<'a> {
+    fn new(of: &'a Turning<'a>, axis: Axis) -> Self {
+        let stands = |c: &usize| *c == 0 || of.liaison.rests(*c, axis.direction);
+        let firm: Vec<usize> = (0..of.liaison.components).filter(|c| *c != of.component).filter(stands).collect();
+        let below: Vec<usize> = (0..of.solids.len()).filter(|c| !of.insertion.above[of.component].contains(c)).collect();
+        let bed = axis.bed(of.component, COARSE, &below, &firm, of.solids, of.poses);
+        Trial { of, axis, firm, bed }
     }
-    let stands = |c: &usize| *c == 0 || liaison.rests(*c, direction);
-    let firm: Vec<usize> = (0..liaison.components).filter(|c| *c != component).filter(stands).collect();
-    let bed = axis.bed(component, COARSE, &firm, solids, poses);
-    let lifted = |angle: f64| {
-        let landing = bed.set_down(&solids[component].mesh, &(axis.turn(angle) * poses[component]));
-        landing.lie(false).is_some_and(|l| l.height >= least)
+
+    fn landing(&self, angle: f64) -> Landing<'_> {
+        let pose = self.axis.turn(angle) * self.of.poses[self.of.component];
+        self.bed.set_down(&self.of.solids[self.of.component].mesh, &pose)
+    }
+
+    /// Lift over its seat (mm); `None` where it would slide off.
+    fn lift(&self, angle: f64) -> Option<f64> {
+        self.landing(angle).lie(false).map(|l| l.height)
+    }
+
+    fn lifted(&self, least: f64) -> Vec<[f64; 2]> {
+        let lifted = |angle: f64| self.lift(angle).is_some_and(|h| h >= least);
+        [-1.0, 1.0].iter().filter_map(|sign| range(*sign, &lifted)).collect()
+    }
+
+    /// Other seats at the angles where patterns repeat and, for a `plain` part that nothing keeps from turning, any angle
+    /// well outside its tolerance.
+    fn seats(&self, plain: bool) -> Vec<[f64; 2]> {
+        let own = self.landing(0.0);
+        let seated = |angle: f64| {
+            let landing = self.landing(angle);
+            let low = landing.lie(false).is_some_and(|l| l.height < IN_SEAT);
+            low && own.looks_unlike(&landing, DIFFERENT) && self.clears(angle)
+        };
+        let zone = self.of.zone;
+        let wide = |angle: f64| {
+            let ends = [angle - zone, angle + zone];
+            if ends.iter().all(|a| seated(*a)) { ends } else { [angle; 2] }
+        };
+        let mut found: Vec<[f64; 2]> = repeats().into_iter().filter(|a| seated(*a)).map(wide).collect();
+        let from = PLAIN.max(PLAIN_ZONES * zone);
+        if plain && found.is_empty() && from < WIDEST {
+            let sides = [[-WIDEST, -from], [from, WIDEST]];
+            found.extend(sides.into_iter().filter(|ends| ends.iter().all(|a| seated(*a))));
+        }
+        found
+    }
+
+    /// Whether what stands above the component has its place still.
+    fn clears(&self, angle: f64) -> bool {
+        let (solids, poses) = (self.of.solids, self.of.poses);
+        let pose = self.axis.turn(angle) * poses[self.of.component];
+        let above = self.of.insertion.above[self.of.component].iter();
+        above.into_iter().all(|&c| self.bed.clear(&solids[self.of.component].mesh, &pose, &solids[c].mesh, &poses[c]))
+    }
+
+    fn turn(&self, ranges: Vec<[f64; 2]>, seated: bool) -> Option<Turn> {
+        let (point, direction) = (self.axis.point.coords.into(), self.axis.direction.into_inner().into());
+        (!ranges.is_empty()).then(|| Turn { point, direction, ranges, firm: self.firm.clone(), seated })
+    }
+}
+
+/// The angles after which patterns repeat (rad), within half a turn to either side.
+fn repeats() -> Vec<f64> {
+    let mut shares: Vec<(u32, u32)> = Vec::new();
+    for k in REPEATS {
+        for j in 1..k {
+            if !shares.iter().any(|(a, b)| a * k == j * b) {
+                shares.push((j, k));
+            }
+        }
+    }
+    let wrapped = |(j, k): (u32, u32)| {
+        let angle = TAU * f64::from(j) / f64::from(k);
+        if 2 * j > k { angle - TAU } else { angle }
     };
-    let widest = WIDEST.min(period(&seats) / 2.0);
-    let ranges: Vec<[f64; 2]> = [-1.0, 1.0].iter().filter_map(|sign| range(*sign, widest, &lifted)).collect();
-    let (point, direction) = (axis.point.coords.into(), direction.into_inner().into());
-    (!ranges.is_empty()).then_some(Turn { point, direction, ranges, firm })
+    shares.into_iter().map(wrapped).collect()
 }
 
 impl Turn {
@@ -94,12 +189,17 @@ impl Turn {
         let axis = Axis { point: self.point.into(), direction: Unit::new_normalize(Vector3::from(self.direction)) };
         let angle = pick(&self.ranges, u[0]);
         let turned = axis.turn(angle) * poses[component];
-        let bed = axis.bed(component, FINE, &self.firm, solids, poses);
+        let still = Settled { pose: turned, pushed: Vec::new(), angle, lift: 0.0 };
+        if self.seated {
+            return still;
+        }
+        let all: Vec<usize> = (0..solids.len()).collect();
+        let bed = axis.bed(component, FINE, &all, &self.firm, solids, poses);
         let landing = bed.set_down(&solids[component].mesh, &turned);
         let first = landing.lie(false);
         let firm = landing.lie(true).filter(|l| l.height > 0.0);
         let (Some(from), Some(to)) = (first.or(firm), firm.or(first)) else {
-            return Settled { pose: turned, pushed: Vec::new(), angle, lift: 0.0 };
+            return still;
         };
         let lie: Lie = from.towards(&to, u[1]);
         let down = |(c, depth): (usize, f64)| (c, Translation3::from(axis.direction.into_inner() * -depth) * poses[c]);
@@ -116,25 +216,34 @@ struct Axis {
 }
 
 impl Axis {
-    /// The axis a component is likely to be turned about: that of its largest central cylinder along the direction, else
-    /// the direction through the middle of its vertices.
-    fn of(solid: &Solid, pose: &Isometry3<f64>, direction: Unit<Vector3<f64>>) -> Self {
-        let positions = &solid.mesh.positions;
-        let sum: Vector3<f64> = positions.iter().map(|p| p.coords).sum();
-        let middle = Axis { point: pose * Point3::from(sum / positions.len().max(1) as f64), direction };
+    /// The axes a component is likely to be turned about, the likeliest first: that of its largest central cylinder along
+    /// the direction; those through the middle of its pegs, of its box and of its vertices.
+    fn candidates(solid: &Solid, pose: &Isometry3<f64>, direction: Unit<Vector3<f64>>) -> Vec<Self> {
+        let through = |point: Point3<f64>| Axis { point, direction };
+        let middle = through(pose * mean(&solid.mesh.positions));
         let central = CENTRAL * middle.reach(solid, pose);
-        let cylinders = solid.faces.iter().filter_map(|f| match &solid.surfaces[f.surface] {
+        let cylinder = |f: &Face| match &solid.surfaces[f.surface] {
             Surface::Cylinder { point, axis, radius } => {
-                Some((pose * point, pose.rotation * axis.into_inner(), *radius))
+                let along = (pose.rotation * axis.into_inner()).cross(&direction).norm() < PARALLEL;
+                along.then_some((pose * point, *radius, f.outward))
             }
             _ => None,
-        });
-        let candidates =
-            cylinders.filter(|(p, a, _)| a.cross(&direction).norm() < PARALLEL && middle.offset(p).norm() < central);
-        match candidates.max_by(|a, b| a.2.total_cmp(&b.2)) {
-            Some((point, ..)) => Axis { point, direction },
-            None => middle,
+        };
+        let cylinders: Vec<(Point3<f64>, f64, bool)> = solid.faces.iter().filter_map(cylinder).collect();
+        let about = cylinders.iter().filter(|(p, ..)| middle.offset(p).norm() < central);
+        let largest = about.max_by(|a, b| a.1.total_cmp(&b.1)).map(|c| through(c.0));
+        let pegs: Vec<Point3<f64>> = cylinders.iter().filter(|c| c.2).map(|c| c.0).collect();
+        let pegs = (pegs.len() > 1).then(|| through(mean(&pegs)));
+        let bounds = through(pose * box_middle(&solid.mesh.positions));
+        let mut axes: Vec<Axis> = Vec::new();
+        for axis in [largest, pegs, Some(bounds), Some(middle)].into_iter().flatten() {
+            if axes.iter().all(|a| a.offset(&axis.point).norm() > SAME_AXIS) {
+                axes.push(axis);
+            }
         }
+        // A round part has its one axis; of any other the likeliest two are enough.
+        axes.truncate(if largest.is_some() { 1 } else { 2 });
+        axes
     }
 
     fn turn(&self, angle: f64) -> Isometry3<f64> {
@@ -153,31 +262,36 @@ impl Axis {
         solid.mesh.positions.iter().map(|p| self.offset(&(pose * p)).norm()).fold(0.0, f64::max)
     }
 
-    /// What a component turned about the axis is set down on.
-    fn bed(&self, component: usize, cell: f64, firm: &[usize], solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Bed {
-        let others = (0..solids.len()).filter(|c| *c != component).map(|c| (c, firm.contains(&c)));
+    /// What a component turned about the axis is set down on: `others`, of which some stand firm.
+    fn bed(
+        &self,
+        component: usize,
+        cell: f64,
+        others: &[usize],
+        firm: &[usize],
+        solids: &[Arc<Solid>],
+        poses: &[Isometry3<f64>],
+    ) -> Bed {
+        let others = others.iter().filter(|c| **c != component).map(|c| (*c, firm.contains(c)));
         let [u, v, _] = Frame::along(self.direction).coordinates(&self.point);
         let radius = self.reach(&solids[component], &poses[component]);
         Bed::new(self.direction, [u, v], radius, cell, &others.collect::<Vec<_>>(), solids, poses)
     }
 }
 
-/// The contacts that stop a component from turning about an axis: where they stand round it.
-fn seats(liaison: &Liaison, component: usize, axis: &Axis) -> Vec<Vector3<f64>> {
-    let sideways = liaison.of(component).filter(|c| c.sideways_span(axis.direction).is_some());
-    sideways.map(|c| axis.offset(&c.point)).filter(|o| o.norm() > ON_AXIS).collect()
+fn mean(points: &[Point3<f64>]) -> Point3<f64> {
+    let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
+    Point3::from(sum / points.len().max(1) as f64)
 }
 
-/// The smallest turn that maps the seats on themselves (rad); a whole turn if there is none.
-fn period(seats: &[Vector3<f64>]) -> f64 {
-    let maps = |turn: &UnitQuaternion<f64>| seats.iter().all(|s| seats.iter().any(|t| (turn * s - t).norm() < ON_AXIS));
-    let turns = seats[1..].iter().filter_map(|s| UnitQuaternion::rotation_between(&seats[0], s));
-    turns.filter(maps).map(|t| t.angle()).filter(|a| *a > PARALLEL).fold(TAU, f64::min)
+fn box_middle(points: &[Point3<f64>]) -> Point3<f64> {
+    let ends = |i: usize| points.iter().fold([f64::MAX, f64::MIN], |e, p| [e[0].min(p[i]), e[1].max(p[i])]);
+    Point3::from(Vector3::from_fn(|i, _| ends(i).iter().sum::<f64>() / 2.0))
 }
 
 /// The turns of one sign that lift the part, from the first on (rad, low to high).
-fn range(sign: f64, widest: f64, lifted: &dyn Fn(f64) -> bool) -> Option<[f64; 2]> {
-    let steps = (widest / STEP + 1e-6).floor() as usize;
+fn range(sign: f64, lifted: &dyn Fn(f64) -> bool) -> Option<[f64; 2]> {
+    let steps = (WIDEST / STEP + 1e-6).floor() as usize;
     let holds = |k: &usize| lifted(sign * STEP * *k as f64);
     let first = (1..=steps).find(holds)?;
     let last = (first + 1..=steps).take_while(holds).last().unwrap_or(first);
@@ -214,8 +328,17 @@ mod tests {
         let a = sample::pattern_wheel();
         let poses = place(&a.design, &a.design.nominal());
         let (found, _) = analyse(&a.design, &a.solids);
-        let turn = turns(&found.liaison, &found.insertion, WHEEL_A2, 0.8, &a.solids, &poses);
-        (a, poses, turn.expect("wheel_a2 can be turned"))
+        let of = Turning {
+            component: WHEEL_A2,
+            insertion: &found.insertion,
+            liaison: &found.liaison,
+            solids: &a.solids,
+            poses: &poses,
+            zone: 0.001,
+        };
+        let mut turns = turns(&of, 0.8);
+        assert!(!turns[0].seated);
+        (a, poses, turns.remove(0))
     }
 
     /// The alignment pins end at z = 20.6, hd_pin at 21.5, unlatch_pin at 23; the wheel's underside is at 18.
@@ -252,14 +375,6 @@ mod tests {
             let [near, far] = [low.abs().min(high.abs()), low.abs().max(high.abs())].map(f64::to_degrees);
             assert!((0.2..4.0).contains(&near) && (far - 40.0).abs() < 1e-6, "{near} {far}");
         }
-    }
-
-    #[test]
-    fn seats_on_a_regular_pattern_repeat() {
-        let at = |degrees: f64| Vector3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0) * 18.0;
-        let six: Vec<_> = (0..6).map(|k| at(60.0 * k as f64)).collect();
-        assert!((period(&six).to_degrees() - 60.0).abs() < 1e-6);
-        assert!((period(&[at(0.0), at(90.0), at(200.0)]) - TAU).abs() < 1e-6);
     }
 
     #[test]

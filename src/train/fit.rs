@@ -214,13 +214,13 @@ fn quantised(draws: &[Vec<Grid>], steps: &[f64]) -> Vec<Image> {
     out
 }
 
-/// The locator: points on components that no modelled fault carries away. Where those show too few edges, the watched
+/// The locator: points on what no misplaced part takes along or hides. Where those show too few edges, the watched
 /// components' own in every state, and of those the light may decide which side is the brighter: a bare part is darker
 /// than its ground in one room and brighter in the next.
-pub fn locator(context: &Context, datum: &[bool]) -> Locator {
+pub fn locator(context: &Context) -> Locator {
     let plan = context.plan;
     let good: Vec<&Shot> = context.shots.good.iter().collect();
-    let on_datum = |x: usize, y: usize| datum[component_near(context, x, y)?].then_some(());
+    let on_datum = |x: usize, y: usize| plan.datum[nearest(context, x, y)?].then_some(());
     let found = points(context, &good, "good", &on_datum, 1.0, None, false);
     let unsigned = found.fine.len() < ENOUGH_DATUM_POINTS;
     let mut groups = if unsigned {

@@ -48,8 +48,6 @@ pub struct Job<'a> {
     pub modes: &'a [ErrorMode],
     /// The tree of the whole assembly, from the component everything stands on.
     pub tree: &'a ErrorTree,
-    /// Per component: no modelled fault carries it away, so it may serve to locate the assembly.
-    pub datum: &'a [bool],
     /// Digest of the resolved spec.
     pub spec: String,
 }
@@ -176,7 +174,7 @@ fn fit_model(job: &Job, plan: &Plan, shots: &Shots) -> Model {
             escape: unmeasured,
             modes: Vec::new(),
         },
-        locator: fit::locator(&context, job.datum),
+        locator: fit::locator(&context),
         nodes,
     }
 }

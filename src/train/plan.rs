@@ -5,7 +5,7 @@
 //! so what no fault of the component can touch has no say.
 
 use super::shots::Drawn;
-use crate::assembly::fault::ErrorMode;
+use crate::assembly::fault::{ErrorMode, FaultKind};
 use crate::design::model::{Design, Expr};
 use crate::runtime::camera::Camera;
 use crate::runtime::window::Frame;
@@ -63,6 +63,9 @@ pub struct Plan {
     pub scenes: Vec<Vec<usize>>,
     /// Modes that change next to nothing in the image.
     pub unseen: Vec<usize>,
+    /// Per px of the shots: no misplaced part takes along or hides what is seen there, so it may serve to locate the
+    /// assembly. A part that is missing or stands too high does not mislead: its edges are few among many.
+    pub datum: Vec<bool>,
 }
 
 /// Plans nodes and scenes for the watched components.
@@ -87,7 +90,19 @@ pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, modes: &[ErrorMod
     link(&mut nodes);
     let scenes = gather(modes, &changes);
     disturb(&mut nodes, &scenes, &changes);
-    Plan { base, good: view.good, nodes, scenes, unseen }
+    let datum = datum(&view.good, modes, &changes);
+    Plan { base, good: view.good, nodes, scenes, unseen, datum }
+}
+
+fn datum(good: &ItemBuffer, modes: &[ErrorMode], changes: &[Option<Mask>]) -> Vec<bool> {
+    let misplaced = || (0..modes.len()).filter(|&m| modes[m].kind == FaultKind::Misplaced);
+    let moved = |id: u32| misplaced().any(|m| changes[m].is_some() && modes[m].component + 1 == id as usize);
+    let mut datum: Vec<bool> = good.id.iter().map(|&id| id != 0 && !moved(id)).collect();
+    for change in misplaced().filter_map(|m| changes[m].as_ref()) {
+        let wide = dilate(change, WIDEN);
+        datum.iter_mut().zip(wide.bits).for_each(|(datum, hidden)| *datum &= !hidden);
+    }
+    datum
 }
 
 struct View<'a> {
