@@ -78,14 +78,48 @@ pub fn compile(spec: &str, read: design::Read, options: &Options, observer: &Obs
     line.out
 }
 
+/// Holds a model's promise against fresh renders of the spec it was compiled from: both error rates are in
+/// [`Compiled::proof`]. `None` there, without a diagnostic, says that the model is of another spec.
+#[cfg(feature = "compile")]
+pub fn prove(
+    spec: &str,
+    read: design::Read,
+    options: &Options,
+    model: &runtime::model::Model,
+    trials: train::prove::Trials,
+    observer: &Observer,
+) -> Compiled {
+    let options = Options { wanted: [Artifact::Model].into(), ..options.clone() };
+    let mut line = line::Line::new(&options, observer);
+    if let Some(ready) = ready(spec, read, &mut line) {
+        let job = ready.job();
+        if job.spec == model.spec {
+            let proof = train::prove::prove(&job, model, trials, &|step, i, n| line.tell(step.into(), i, n));
+            line.out.proof = line.accept(proof);
+        }
+    }
+    line.out
+}
+
 /// The line, stage by stage; `None` where it ends early, by fault or because no more was asked for.
 #[cfg(feature = "compile")]
 fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
+    let ready = ready(spec, read, line)?;
+    let trained = train::train(&ready.job(), &|step, done, total| line.tell(step.into(), done, total));
+    let (model, doubts) = line.accept(trained)?;
+    line.out.model = Some(model);
+    line.check(((), doubts))
+}
+
+/// The stages before training.
+#[cfg(feature = "compile")]
+fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::Ready> {
     line.enter(Stage::Design)?;
     let design = line.loaded(design::load(spec, read, &line.options.set))?;
     line.keep(|made| (made.digest, made.design) = (line::digest(&design), Some(design.clone())));
-    let station = line.accept(line::station(&design, line.options.station.as_deref()))?;
-    line.keep(|made| made.station = design.stations.iter().position(|s| s.name == station.name).unwrap_or(0));
+    let index = line.accept(line::station(&design, line.options.station.as_deref()))?;
+    let station = &design.stations[index];
+    line.keep(|made| made.station = index);
     line.emit(Artifact::Design, || artifacts::design(&design));
 
     line.enter(Stage::Solid)?;
@@ -115,11 +149,6 @@ fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
 
     line.enter(Stage::Plan)?;
     let modes = modes();
-    let spec = line::digest(&design);
-    let tree = &assembly::error_tree::error_tree(&analysis.liaison, 0, None);
-    let job = train::Job { design: &design, station, camera, modes: &modes, tree, spec };
-    let trained = train::train(&job, &|step, done, total| line.tell(step.into(), done, total));
-    let (model, doubts) = line.accept(trained)?;
-    line.out.model = Some(model);
-    line.check(((), doubts))
+    let tree = assembly::error_tree::error_tree(&analysis.liaison, 0, None);
+    Some(line::Ready { station: index, camera, modes, tree, design })
 }

@@ -11,11 +11,12 @@ use crate::design::Loaded;
 use crate::design::model::{Design, Part, Station};
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Sources};
-use crate::runtime::model::Model;
+use crate::runtime::model::{Model, Promise};
+use crate::runtime::camera::Camera;
 use crate::scene::Body;
 use crate::scene::build::{self, Instance};
 use crate::solid::{Quality, Solid};
-use crate::train::{Step, shots};
+use crate::train::{Job, Step, shots};
 use crate::view::choose::Choice;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -47,6 +48,8 @@ pub struct Compiled {
     pub inputs: Vec<String>,
     /// What the stages made on the way, if [`Options::keep`] asked for it.
     pub made: Made,
+    /// What [`crate::prove`] measured.
+    pub proof: Option<Promise>,
 }
 
 /// What the stages made, each as far as the line came.
@@ -119,6 +122,29 @@ pub struct Progress {
 
 /// Told about progress.
 pub type Observer<'a> = dyn Fn(Progress) + Sync + 'a;
+
+/// All that training or a proof starts from.
+pub(crate) struct Ready {
+    pub design: Design,
+    /// Index into [`Design::stations`].
+    pub station: usize,
+    pub camera: Camera,
+    pub modes: Vec<ErrorMode>,
+    pub tree: ErrorTree,
+}
+
+impl Ready {
+    pub fn job(&self) -> Job<'_> {
+        Job {
+            design: &self.design,
+            station: &self.design.stations[self.station],
+            camera: self.camera,
+            modes: &self.modes,
+            tree: &self.tree,
+            spec: digest(&self.design),
+        }
+    }
+}
 
 /// The conveyor.
 pub(crate) struct Line<'a> {
@@ -202,10 +228,10 @@ impl<'a> Line<'a> {
     }
 }
 
-/// The station of that name, or the first.
-pub(crate) fn station<'a>(design: &'a Design, name: Option<&str>) -> Result<&'a Station, Vec<Diagnostic>> {
-    let wanted = |s: &&Station| name.is_none_or(|n| s.name == n);
-    design.stations.iter().find(wanted).ok_or_else(|| vec![no_station(design, name.unwrap_or_default())])
+/// The station of that name, or the first: an index into [`Design::stations`].
+pub(crate) fn station(design: &Design, name: Option<&str>) -> Result<usize, Vec<Diagnostic>> {
+    let wanted = |s: &Station| name.is_none_or(|n| s.name == n);
+    design.stations.iter().position(wanted).ok_or_else(|| vec![no_station(design, name.unwrap_or_default())])
 }
 
 fn no_station(design: &Design, name: &str) -> Diagnostic {

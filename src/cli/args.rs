@@ -64,6 +64,8 @@ pub enum Command {
     Inspect(Inspect),
     /// Write a page that shows the assembly in 3-D, what can be told about it, and judged photos.
     Report(Report),
+    /// Hold a model's promise against fresh renders.
+    Prove(Prove),
     /// Explain a diagnostic: `gonogo explain E0305`.
     Explain(Explain),
     /// Compare the outputs of the stages with blessed ones, or bless them.
@@ -199,6 +201,28 @@ pub struct Report {
     /// Where the page goes: one HTML file that needs no other.
     #[arg(short, long, value_name = "PAGE", default_value = "report.html")]
     pub output: PathBuf,
+    #[command(flatten)]
+    pub variant: Variant,
+    #[command(flatten)]
+    pub jobs: Jobs,
+}
+
+#[derive(Debug, Args)]
+pub struct Prove {
+    /// The spec, or `-` for standard input.
+    pub spec: PathBuf,
+    /// The model compiled from it; it names the station.
+    #[arg(long, value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Good assemblies to render.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub goods: u32,
+    /// Assemblies to render with each error mode.
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    pub faults: u32,
+    /// Stations among which they are shared, each installed and lit in its own way and calibrated with one photo.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub customers: u32,
     #[command(flatten)]
     pub variant: Variant,
     #[command(flatten)]

@@ -84,9 +84,17 @@ impl Document {
 
 /// Runs the compiler with progress on the terminal.
 pub fn run(document: &Document, options: &Options, global: &Global) -> Compiled {
+    watched(document, global, |read, observer| crate::compile(&document.name, read, options, observer))
+}
+
+/// Work on a spec, with progress shown and its stages timed as asked for.
+pub fn watched(
+    document: &Document,
+    global: &Global,
+    work: impl FnOnce(crate::design::Read, &crate::Observer) -> Compiled,
+) -> Compiled {
     let monitor = Monitor::new();
-    let read = |name: &str| document.text_of(name);
-    let compiled = crate::compile(&document.name, &read, options, &|progress| monitor.note(progress));
+    let compiled = work(&|name: &str| document.text_of(name), &|progress| monitor.note(progress));
     monitor.finish();
     if global.timings {
         monitor.print_timings();
@@ -174,7 +182,7 @@ fn summarise(model: &Model, path: &Path) -> Result<(), Failure> {
     escapes.try_for_each(|m| output::line(&format!("    {} {}: {}", m.component, m.fault, rate(&m.escape))))
 }
 
-fn rate(rate: &Rate) -> String {
+pub fn rate(rate: &Rate) -> String {
     format!("{} of {} (at most {:.1} %, 95 %)", rate.events, rate.trials, 100.0 * rate.upper_95)
 }
 

@@ -14,6 +14,7 @@ mod output;
 mod overlay;
 mod photos;
 mod progress;
+mod prove;
 pub mod report;
 mod report_page;
 mod verdict;
@@ -58,6 +59,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Calibrate(args) => judge::calibrate(args),
         Command::Inspect(args) => judge::inspect(args),
         Command::Report(args) => report_page::report(args, global),
+        Command::Prove(args) => prove::prove(args, global),
         Command::Explain(args) => explain(args),
         Command::Golden(Golden::Check(args)) => golden::check(args, global),
         Command::Golden(Golden::Bless(args)) => golden::bless(args, global),

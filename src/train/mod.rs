@@ -7,6 +7,7 @@
 mod edges;
 mod fit;
 pub mod plan;
+pub mod prove;
 pub mod shots;
 pub mod stats;
 pub mod synthesise;

@@ -30,13 +30,14 @@ fn upper(events: u32, trials: u32, confidence: f64) -> f64 {
     (low + high) / 2.0
 }
 
-/// Binomial distribution function.
+/// Binomial distribution function, its terms taken as logarithms: far from the mode they are smaller than any number.
 fn at_most(events: u32, trials: u32, p: f64) -> f64 {
-    let mut term = (f64::from(trials) * (1.0 - p).ln()).exp();
-    let mut sum = term;
+    let odds = (p / (1.0 - p)).ln();
+    let mut term = f64::from(trials) * (1.0 - p).ln();
+    let mut sum = term.exp();
     for k in 0..events {
-        term *= f64::from(trials - k) / f64::from(k + 1) * p / (1.0 - p);
-        sum += term;
+        term += (f64::from(trials - k) / f64::from(k + 1)).ln() + odds;
+        sum += term.exp();
     }
     sum
 }
@@ -60,6 +61,14 @@ pub fn rounded(v: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Clopper and Pearson's interval for 5 of 1000 and for 990 of 1000, from the quantiles of the beta distribution.
+    #[test]
+    fn many_trials_have_the_interval_of_the_beta_distribution() {
+        let [few, most] = [rate(5, 1000), rate(990, 1000)];
+        assert!((lower_95(&few) - 0.0016).abs() < 1e-4 && (few.upper_95 - 0.0116).abs() < 1e-4, "{few:?}");
+        assert!((lower_95(&most) - 0.9817).abs() < 1e-4 && (most.upper_95 - 0.9952).abs() < 1e-4, "{most:?}");
+    }
 
     #[test]
     fn normal_quantiles_match_the_table() {

@@ -17,6 +17,7 @@ use crate::runtime::light::{range, within};
 use crate::runtime::model::{Lamp, ModeRate, Model, Promise};
 use crate::runtime::photo::Photo;
 use crate::runtime::pose::Installation;
+use rayon::prelude::*;
 
 /// Lamps of a customer's station give between these shares of the described power.
 const LAMP_POWERS: [f64; 2] = [0.3, 1.7];
@@ -100,7 +101,7 @@ pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, inde
 }
 
 /// One customer's photos, judged.
-struct Judged {
+pub(super) struct Judged {
     /// How well the calibration photo was re-synthesised.
     correlation: f64,
     good: Vec<Verdict>,
@@ -123,15 +124,16 @@ pub fn verify(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMod
     model.promise = promise(model, design, plan, modes, &judged, unfit);
 }
 
-fn judge(model: &Model, plan: &Plan, customer: &Customer, shots: &Shots) -> Option<Judged> {
+/// `None` when the calibration photo does not do.
+pub(super) fn judge(model: &Model, plan: &Plan, customer: &Customer, shots: &Shots) -> Option<Judged> {
     let take = |lamps: &[Grid], index: u64| photo(model, customer, lamps, plan.base, index);
     let (first, rest) = shots.good.split_first()?;
     let calibration: Calibration = calibrate::fit(model, &[take(&first.lamps, 0)]).ok()?;
     let inspector = Inspector::new(model, &calibration)?;
-    let good = rest.iter().enumerate().map(|(i, s)| inspector.inspect(&take(&s.lamps, 1 + i as u64))).collect();
+    let good = rest.par_iter().enumerate().map(|(i, s)| inspector.inspect(&take(&s.lamps, 1 + i as u64))).collect();
     let scene = |(scene, taken): (usize, &Vec<FaultyShot>)| {
         let index = |i: usize| ((scene as u64 + 1) << 20) + i as u64;
-        taken.iter().enumerate().map(|(i, f)| inspector.inspect(&take(&f.shot.lamps, index(i)))).collect()
+        taken.par_iter().enumerate().map(|(i, f)| inspector.inspect(&take(&f.shot.lamps, index(i)))).collect()
     };
     Some(Judged {
         correlation: calibration.correlation,
@@ -239,7 +241,8 @@ fn accept(judged: &[Judged], unsigned: bool) -> f64 {
     if lowest.is_finite() { rounded((lowest * ACCEPT_SHARE).max(0.0)) } else { 0.0 }
 }
 
-fn promise(
+/// Both rates, by the model's thresholds; a customer who could not calibrate counts as a false reject.
+pub(super) fn promise(
     model: &Model,
     design: &Design,
     plan: &Plan,
