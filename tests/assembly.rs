@@ -97,7 +97,9 @@ fn the_top_wheel_can_lie_on_the_pins_and_the_ring_fits_at_thirds_of_a_turn() {
     let modes = wheel.modes();
     let misplaced: Vec<&ErrorMode> = modes.iter().filter(|m| m.kind == FaultKind::Misplaced).collect();
     assert_eq!(misplaced.iter().map(|m| wheel.name(m.component)).collect::<Vec<_>>(), ["locking_ring", "wheel_a2"]);
-    let [Motion::Turn(ring), Motion::Turn(turn)] = [0, 1].map(|i| &misplaced[i].motion) else { panic!("{misplaced:?}") };
+    let [Motion::Turn(ring), Motion::Turn(turn)] = [0, 1].map(|i| &misplaced[i].motion) else {
+        panic!("{misplaced:?}")
+    };
     let middles: Vec<f64> = ring.ranges.iter().map(|r| ((r[0] + r[1]) / 2.0).to_degrees()).collect();
     assert!(ring.seated && middles.len() == 2, "{ring:?}");
     assert!((middles[0] - 120.0).abs() < 0.1 && (middles[1] + 120.0).abs() < 0.1, "{middles:?}");

@@ -102,7 +102,8 @@ impl<'a> Trial<'a> {
     fn new(of: &'a Turning<'a>, axis: Axis) -> Self {
         let stands = |c: &usize| *c == 0 || of.liaison.rests(*c, axis.direction);
         let firm: Vec<usize> = (0..of.liaison.components).filter(|c| *c != of.component).filter(stands).collect();
-        let below: Vec<usize> = (0..of.solids.len()).filter(|c| !of.insertion.above[of.component].contains(c)).collect();
+        let below: Vec<usize> =
+            (0..of.solids.len()).filter(|c| !of.insertion.above[of.component].contains(c)).collect();
         let bed = axis.bed(of.component, COARSE, &below, &firm, of.solids, of.poses);
         Trial { of, axis, firm, bed }
     }
