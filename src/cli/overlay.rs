@@ -158,6 +158,7 @@ mod tests {
             against: Vec::new(),
             best_fault: "missing".into(),
             inside: 1.0,
+            strangeness: 0.0,
             faulty,
             explained: false,
         }

@@ -138,6 +138,13 @@ impl Density {
         self.log_norm - (STUDENT + 1.0) / 2.0 * noise - prior / 2.0
     }
 
+    /// Per coefficient, minus the logarithm of the noise's density relative to its peak: 0 for one as expected.
+    pub fn surprise(&self, z: &[f32]) -> Vec<f32> {
+        let rest = self.residual(z, &self.nuisances(z));
+        let tail = |r: &f32| ((STUDENT + 1.0) / 2.0 * (1.0 + f64::from(r * r) / STUDENT).ln()) as f32;
+        rest.iter().map(tail).collect()
+    }
+
     /// The nuisances' robust maximum.
     fn nuisances(&self, z: &[f32]) -> Vec<f64> {
         const ROUNDS: usize = 2;

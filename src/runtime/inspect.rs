@@ -18,6 +18,10 @@ use std::borrow::Cow;
 
 /// A node of which less is inside the photo cannot be judged.
 const LEAST_INSIDE: f64 = 0.6;
+/// Strangeness of a square in which every coefficient is three standard deviations off (Student's t, five degrees).
+const STRANGE: f64 = 3.09;
+/// Weight of the middle strangeness of the photo's nodes in what one may have.
+const COMMON: f64 = 2.0;
 /// Below this share of the calibration's score the assembly counts as not found.
 const LEAST_SCORE: f64 = 0.5;
 
@@ -64,6 +68,8 @@ pub struct NodeReport {
     /// The error mode that fits best.
     pub best_fault: String,
     pub inside: f64,
+    /// How unlike its good state the node is where it is least like it (see [`Evidence::strangeness`]).
+    pub strangeness: f64,
     pub faulty: bool,
     /// Faulty by itself, but explained by another component's fault.
     pub explained: bool,
@@ -165,13 +171,20 @@ impl<'a> Inspector<'a> {
         let order = self.blame(&mut nodes, &evidence, &disturbed);
         let findings: Vec<Finding> = order.iter().map(|&i| self.finding(i, &nodes[i])).collect();
         let hidden = nodes.iter().find(|n| n.inside < LEAST_INSIDE);
-        let (decision, reason) = match (&findings[..], hidden) {
-            ([], None) => (Decision::Go, String::new()),
-            ([], Some(node)) => {
+        let (decision, reason) = match (&findings[..], hidden, strange(&nodes)) {
+            ([], None, None) => (Decision::Go, String::new()),
+            ([], Some(node), _) => {
                 let share = 100.0 * node.inside;
                 (Decision::CannotInspect, format!("only {share:.0} % of {} lies inside the photo", node.name))
             }
-            (findings, _) => (Decision::NoGo, summary(findings)),
+            ([], None, Some(node)) => {
+                let why = format!(
+                    "{} looks like nothing the model knows: neither as it should nor as when faulty",
+                    node.name
+                );
+                (Decision::CannotInspect, why)
+            }
+            (findings, ..) => (Decision::NoGo, summary(findings)),
         };
         Verdict {
             decision,
@@ -221,6 +234,7 @@ impl<'a> Inspector<'a> {
             against: against(evidence, self.coefficients(index)),
             best_fault: fault.map_or_else(String::new, |h| node.hypotheses[h].fault.clone()),
             inside: evidence.inside,
+            strangeness: evidence.strangeness,
             // What is no number is no proof of anything.
             faulty: score.is_nan() || score < node.threshold,
             explained: false,
@@ -309,6 +323,16 @@ impl<'a> Inspector<'a> {
         };
         depth(nominal, &self.prepared.home) / depth(&self.camera, pose) * self.camera.focal / nominal.focal
     }
+}
+
+/// The node that is least like its good state, if some part of it is farther from it than noise and what the photo's other
+/// nodes have in common (a model that is not quite this station's) can bring it. A lone node has nothing to be held against.
+fn strange(nodes: &[NodeReport]) -> Option<&NodeReport> {
+    let mut rising: Vec<&NodeReport> = nodes.iter().collect();
+    rising.sort_by(|a, b| a.strangeness.total_cmp(&b.strangeness));
+    let (worst, others) = rising.split_last()?;
+    let common = others.get(others.len() / 2)?.strangeness;
+    (worst.strangeness > STRANGE + COMMON * common).then_some(worst)
 }
 
 /// The light of a station whose lamps were calibrated to these weights.

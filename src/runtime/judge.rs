@@ -128,6 +128,8 @@ pub struct Evidence {
     pub inside: f64,
     /// Best shift under the good state (node px).
     pub shift: [f64; 2],
+    /// How far from the first density the node is where it is farthest: mean of [`Density::surprise`] in a square.
+    pub strangeness: f64,
 }
 
 /// A node's coefficients at one shift (node px), with the shift's log prior.
@@ -197,8 +199,9 @@ impl NodeImages {
         let inside = self.window.cut(reduced, &placed, [0.0, 0.0]).1;
         let shifted = self.shifted(reduced, &placed, light);
         let best: Vec<(f64, usize)> = densities.iter().map(|density| likeliest(density, &shifted)).collect();
-        let shift = shifted[best[0].1].shift;
-        Evidence { log_likelihoods: best.into_iter().map(|(score, _)| score).collect(), inside, shift }
+        let Shifted { shift, ref coefficients, .. } = shifted[best[0].1];
+        let strangeness = self.stencil.highest_mean(&densities[0].surprise(coefficients)).unwrap_or(0.0);
+        Evidence { log_likelihoods: best.into_iter().map(|(score, _)| score).collect(), inside, shift, strangeness }
     }
 
     /// The shift (node px) at which a density fits best.

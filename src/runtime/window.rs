@@ -129,6 +129,25 @@ impl Stencil {
         self.cells.iter().flat_map(|c| integral.gradient(c.x, c.y, c.half)).collect()
     }
 
+    /// The highest mean of a value per coefficient over the squares of the coarsest level's cells, each with all
+    /// coefficients of any level whose cell has its centre in it. Squares with few coefficients do not count.
+    pub fn highest_mean(&self, values: &[f32]) -> Option<f64> {
+        const FEWEST: usize = 24;
+        let coarsest = self.levels.last()?;
+        let squares = &self.cells[coarsest.start / 2..coarsest.end / 2];
+        let mean = |s: &Cell| {
+            let inside = |c: &Cell| c.x.abs_diff(s.x) <= s.half && c.y.abs_diff(s.y) <= s.half;
+            let own = self.cells.iter().zip(values.chunks_exact(2)).filter(|(c, _)| inside(c));
+            let (mut sum, mut count) = (0.0, 0usize);
+            for (_, pair) in own {
+                sum += f64::from(pair[0] + pair[1]);
+                count += 2;
+            }
+            (count >= FEWEST).then(|| sum / count as f64)
+        };
+        squares.iter().filter_map(mean).reduce(f64::max)
+    }
+
     /// True for the coefficients whose cell holds a pixel at or above `limit`.
     pub fn touching(&self, image: &Grid, limit: f32) -> Vec<bool> {
         let over = Grid::new(image.width, image.height, image.values.iter().map(|&v| f32::from(v >= limit)).collect());

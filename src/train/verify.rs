@@ -12,7 +12,7 @@ use crate::design::model::Design;
 use crate::rng::Stream;
 use crate::runtime::calibrate::{self, Calibration};
 use crate::runtime::grid::Grid;
-use crate::runtime::inspect::{self, Inspector, Verdict};
+use crate::runtime::inspect::{self, Decision, Inspector, Verdict};
 use crate::runtime::light::{range, within};
 use crate::runtime::model::{Lamp, ModeRate, Model, Promise};
 use crate::runtime::photo::Photo;
@@ -252,7 +252,9 @@ pub(super) fn promise(
 ) -> Promise {
     // The verdicts were taken before the thresholds were known.
     let faulty = |v: &Verdict, node: usize| v.nodes[node].score < model.nodes[node].threshold;
-    let rejected = |v: &&Verdict| v.nodes.is_empty() || (0..v.nodes.len()).any(|n| faulty(v, n));
+    // Neither does a photo that cannot be judged pass.
+    let unsure = |v: &&Verdict| v.decision == Decision::CannotInspect;
+    let rejected = |v: &&Verdict| unsure(v) || (0..v.nodes.len()).any(|n| faulty(v, n));
     let goods: Vec<&Verdict> = judged.iter().flat_map(|j| &j.good).collect();
     let false_rejects = goods.iter().filter(|v| rejected(v)).count() + unfit;
     let mut rates = Vec::new();
@@ -263,7 +265,7 @@ pub(super) fn promise(
             let Some(node) = model.nodes.iter().position(|n| &n.name == component) else { continue };
             let verdicts: Vec<&Verdict> = judged.iter().flat_map(|j| &j.faulty[scene]).collect();
             // A photo in which the assembly is not found is not passed: it does not escape.
-            let passed = |v: &&&Verdict| !v.nodes.is_empty() && !faulty(v, node);
+            let passed = |v: &&&Verdict| !unsure(v) && !faulty(v, node);
             let escaped = verdicts.iter().filter(passed).count() as u32;
             escapes += escaped;
             trials += verdicts.len() as u32;
