@@ -12,10 +12,11 @@ use crate::design::model::{Design, Part, Station};
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Sources};
 use crate::runtime::camera::Camera;
-use crate::runtime::model::{Model, Promise};
+use crate::runtime::model::Model;
 use crate::scene::Body;
 use crate::scene::build::{self, Instance};
 use crate::solid::{Quality, Solid};
+use crate::train::prove::Proof;
 use crate::train::{Job, Step, shots};
 use crate::view::choose::Choice;
 use std::collections::{BTreeMap, BTreeSet};
@@ -49,7 +50,7 @@ pub struct Compiled {
     /// What the stages made on the way, if [`Options::keep`] asked for it.
     pub made: Made,
     /// What [`crate::prove`] measured.
-    pub proof: Option<Promise>,
+    pub proof: Option<Proof>,
 }
 
 /// What the stages made, each as far as the line came.

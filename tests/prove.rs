@@ -24,10 +24,11 @@ fn a_proof_counts_every_good_and_every_fault() {
         pool.install(|| prove(SPEC, &read, &options(), &model, trials, &|_| ())).proof.unwrap()
     };
     let proof = measure(2);
-    assert_eq!(proof.false_reject.trials, 6);
-    assert!(!proof.modes.is_empty());
-    assert_eq!(proof.modes.len(), model.promise.modes.len());
-    for mode in &proof.modes {
+    assert_eq!(proof.rates.false_reject.trials, 6);
+    assert!(!proof.rates.modes.is_empty());
+    assert_eq!(proof.rates.modes.len(), model.promise.modes.len());
+    assert_eq!(proof.seen_from.len(), proof.rates.modes.len());
+    for mode in &proof.rates.modes {
         assert_eq!(mode.escape.trials, 4, "{} {}", mode.component, mode.fault);
     }
     assert_eq!(proof, measure(1));

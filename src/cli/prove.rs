@@ -6,7 +6,7 @@ use super::output::{self, Failure};
 use super::{Exit, judge};
 use crate::Options;
 use crate::runtime::model::{Promise, Rate};
-use crate::train::prove::Trials;
+use crate::train::prove::{Proof, Trials};
 use crate::train::stats::lower_95;
 
 /// Prints promise and proof; exit code 1 if good assemblies are surely rejected more often than the spec allows.
@@ -32,7 +32,7 @@ pub fn prove(args: &Prove, global: &Global) -> Result<Exit, Failure> {
     for line in table(&model.promise, &proof) {
         output::line(&line)?;
     }
-    Ok(if broken(&proof) { Exit::Faults } else { Exit::Fine })
+    Ok(if broken(&proof.rates) { Exit::Faults } else { Exit::Fine })
 }
 
 /// Whether more good assemblies are rejected than the spec allows, at 95 % confidence.
@@ -40,7 +40,7 @@ fn broken(proof: &Promise) -> bool {
     lower_95(&proof.false_reject) > proof.false_reject_asked
 }
 
-fn table(promise: &Promise, proof: &Promise) -> Vec<String> {
+fn table(promise: &Promise, Proof { rates: proof, seen_from }: &Proof) -> Vec<String> {
     let mut lines = vec![
         format!("false rejects: asked {:.2} % at most", 100.0 * proof.false_reject_asked),
         row("", &promise.false_reject, &proof.false_reject),
@@ -51,10 +51,12 @@ fn table(promise: &Promise, proof: &Promise) -> Vec<String> {
         let name = format!("{} {}", mode.component, mode.fault);
         // Modes stand in the same order in both: the same spec gives the same plan.
         let promised = promise.modes.get(i).filter(|m| m.component == mode.component && m.fault == mode.fault);
-        lines.push(promised.map_or_else(
+        let line = promised.map_or_else(
             || format!("    {name}: {}", compile::rate(&mode.escape)),
             |m| row(&name, &m.escape, &mode.escape),
-        ));
+        );
+        let seen = seen_from.get(i).copied().flatten().map(|mm| format!(", 9 in 10 from {mm:.1} mm on"));
+        lines.push(line + &seen.unwrap_or_default());
     }
     if broken(proof) {
         lines.push("the promised rate of false rejects is not kept".into());
@@ -80,11 +82,13 @@ fn row(name: &str, promised: &Rate, proven: &Rate) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::runtime::model::ModeRate;
     use crate::train::stats::rate;
 
     fn proof(rejected: u32) -> Promise {
         let escape = rate(0, 10);
-        Promise { false_reject_asked: 0.001, false_reject: rate(rejected, 1000), escape, modes: Vec::new() }
+        let modes = vec![ModeRate { component: "pin".into(), fault: "not seated".into(), escape }];
+        Promise { false_reject_asked: 0.001, false_reject: rate(rejected, 1000), escape, modes }
     }
 
     #[test]
@@ -95,7 +99,8 @@ mod tests {
 
     #[test]
     fn the_table_shows_both_rates_of_every_mode() {
-        let lines = table(&proof(0), &proof(5));
+        let lines = table(&proof(0), &Proof { rates: proof(5), seen_from: vec![Some(1.26)] });
+        assert!(lines[4].contains("pin not seated") && lines[4].ends_with("9 in 10 from 1.3 mm on"), "{lines:?}");
         assert!(lines[1].contains("promised    0 of 1000") && lines[1].contains("measured    5 of 1000"), "{lines:?}");
         assert!(lines.last().is_some_and(|l| l.contains("not kept")));
     }

@@ -106,7 +106,7 @@ pub(super) struct Judged {
     correlation: f64,
     good: Vec<Verdict>,
     /// Per scene, per draw.
-    faulty: Vec<Vec<Verdict>>,
+    pub faulty: Vec<Vec<Verdict>>,
 }
 
 /// Judges the held-out shots of each customer and writes thresholds and promise into the model. The first good shot of
