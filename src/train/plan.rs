@@ -13,6 +13,7 @@ use crate::scene::build::bodies;
 use crate::view::item_buffer::{ItemBuffer, Mask, PixelBox};
 use crate::view::nodes::{change_mask, dilate};
 use nalgebra::Vector3;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Places in a sweep at which the change of the image is looked at.
 const LOOKS: [f64; 3] = [0.05, 0.5, 0.95];
@@ -26,6 +27,8 @@ const MOST_NODE_PIXELS: u32 = 3000;
 const DISTURBS: f64 = 0.3;
 /// A fault shows in another's node when its change covers this share of the node's.
 const TOUCHES: f64 = 0.03;
+/// A misplaced part hides a component of which it changes more than this share.
+const HIDES: f64 = 0.5;
 /// Standard deviation of a node's shift when its placement is exact (px of the photo): what pose and camera leave.
 const POSE_RESIDUAL: f64 = 1.0;
 /// The smallest watched component should have this many px of the shots across.
@@ -63,7 +66,7 @@ pub struct Plan {
     pub scenes: Vec<Vec<usize>>,
     /// Modes that change next to nothing in the image.
     pub unseen: Vec<usize>,
-    /// Per px of the shots: no misplaced part takes along or hides what is seen there, so it may serve to locate the
+    /// Per px of the shots: no misplaced part takes along or hides the component seen there, so it may serve to locate the
     /// assembly. A part that is missing or stands too high does not mislead: its edges are few among many.
     pub datum: Vec<bool>,
 }
@@ -94,15 +97,20 @@ pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, modes: &[ErrorMod
     Plan { base, good: view.good, nodes, scenes, unseen, datum }
 }
 
+/// See [`Plan::datum`].
 fn datum(good: &ItemBuffer, modes: &[ErrorMode], changes: &[Option<Mask>]) -> Vec<bool> {
-    let misplaced = || (0..modes.len()).filter(|&m| modes[m].kind == FaultKind::Misplaced);
-    let moved = |id: u32| misplaced().any(|m| changes[m].is_some() && modes[m].component + 1 == id as usize);
-    let mut datum: Vec<bool> = good.id.iter().map(|&id| id != 0 && !moved(id)).collect();
-    for change in misplaced().filter_map(|m| changes[m].as_ref()) {
-        let wide = dilate(change, WIDEN);
-        datum.iter_mut().zip(wide.bits).for_each(|(datum, hidden)| *datum &= !hidden);
-    }
-    datum
+    let misplaced = || (0..modes.len()).filter(|&m| modes[m].kind == FaultKind::Misplaced && changes[m].is_some());
+    let hidden = |id: u32, change: &Mask| {
+        let own = || (0..good.id.len()).filter(|&i| good.id[i] == id);
+        own().filter(|&i| change.bits[i]).count() as f64 > HIDES * own().count() as f64
+    };
+    let firm = |id: u32| {
+        let mut own = misplaced().map(|m| (modes[m].component + 1 == id as usize, changes[m].as_ref()));
+        id != 0 && own.all(|(moved, change)| !moved && !change.is_some_and(|c| hidden(id, c)))
+    };
+    let components: BTreeMap<u32, bool> =
+        good.id.iter().copied().collect::<BTreeSet<u32>>().into_iter().map(|id| (id, firm(id))).collect();
+    good.id.iter().map(|id| components[id]).collect()
 }
 
 struct View<'a> {
