@@ -6,6 +6,7 @@
 
 mod edges;
 mod fit;
+mod other_views;
 pub mod plan;
 pub mod prove;
 pub mod shots;
@@ -23,9 +24,10 @@ use crate::runtime::photo::Tone;
 use crate::runtime::pose::Pose;
 use crate::scene::build;
 use fit::Context;
+use other_views::Views;
 use plan::Plan;
 use rayon::prelude::*;
-use shots::Setup;
+use shots::{Drawn, Setup};
 use synthesise::{Draws, Shots, synthesise};
 
 /// Customers imagined for the held-out renders.
@@ -71,7 +73,7 @@ pub fn train(job: &Job, observer: &Observer) -> Result<(Model, Vec<Diagnostic>),
     observer(Step::Plan, 0, 1);
     let nominal = shots::nominal(job.design, job.station)?;
     let plan = plan::plan(job.design, &job.camera, &nominal, job.modes);
-    let mut doubts = doubts(job, &plan);
+    let mut doubts = doubts(job, &plan, &nominal);
     let images = job.design.train.images.max(2);
     let draws = Draws { seed: job.design.train.seed, count: images, faulty: images };
     let shots = render(job, &plan, &job.camera, draws, &|i, n| observer(Step::Render, i, n))?;
@@ -80,37 +82,51 @@ pub fn train(job: &Job, observer: &Observer) -> Result<(Model, Vec<Diagnostic>),
     let held_out = held_out(job, &plan, &model, observer)?;
     observer(Step::Verify, 0, 1);
     verify::verify(&mut model, job.design, &plan, job.modes, &held_out);
-    doubts.extend(overlaps(job, &model));
+    doubts.extend(overlaps(job, &model, &nominal));
     Ok((model, doubts))
 }
 
 /// Components whose faults cannot be seen.
-fn doubts(job: &Job, plan: &Plan) -> Vec<Diagnostic> {
+fn doubts(job: &Job, plan: &Plan, nominal: &Drawn) -> Vec<Diagnostic> {
     let blind = |&m: &usize| {
         let mode = &job.modes[m];
         let component = &job.design.components[mode.component];
         let message =
             format!("station `{}` cannot tell when `{}` is {}", job.station.name, component.name, mode.kind.word());
-        Diagnostic::warning("W0602", component.span, message)
-            .label("nothing in the image changes")
-            .note("a go says nothing about this fault; another view may show it")
+        Diagnostic::warning("W0602", component.span, message).label("nothing in the image changes")
     };
-    plan.unseen.iter().map(blind).collect()
+    let found: Vec<(&ErrorMode, Diagnostic)> = plan.unseen.iter().map(|m| (&job.modes[*m], blind(m))).collect();
+    advised(job, nominal, found, "a go says nothing about this fault")
 }
 
 /// Faults that the model lets pass too often to rely on it.
-fn overlaps(job: &Job, model: &Model) -> Vec<Diagnostic> {
+fn overlaps(job: &Job, model: &Model, nominal: &Drawn) -> Vec<Diagnostic> {
     let weak = model.promise.modes.iter().filter(|m| f64::from(m.escape.events) > WEAK * f64::from(m.escape.trials));
-    let doubt = |mode: &ModeRate| {
-        let component = job.design.components.iter().find(|c| c.name == mode.component);
-        let (escaped, trials) = (mode.escape.events, mode.escape.trials);
+    let doubt = |rate: &ModeRate| {
+        let of =
+            |m: &&ErrorMode| job.design.components[m.component].name == rate.component && m.kind.word() == rate.fault;
+        let mode = job.modes.iter().find(of)?;
+        let (escaped, trials) = (rate.escape.events, rate.escape.trials);
         let message =
-            format!("station `{}` can hardly tell when `{}` is {}", job.station.name, mode.component, mode.fault);
-        Diagnostic::warning("W0703", component.map_or(job.station.span, |c| c.span), message)
-            .label(format!("{escaped} of {trials} synthetic photos with this fault pass"))
-            .note("a go says little about this fault; another view or another light may show it")
+            format!("station `{}` can hardly tell when `{}` is {}", job.station.name, rate.component, rate.fault);
+        let fault = Diagnostic::warning("W0703", job.design.components[mode.component].span, message)
+            .label(format!("{escaped} of {trials} synthetic photos with this fault pass"));
+        Some((mode, fault))
     };
-    weak.map(doubt).collect()
+    advised(job, nominal, weak.filter_map(doubt).collect(), "a go says little about this fault")
+}
+
+/// With a note on where the fault would show, if there is such a place.
+fn advised(job: &Job, nominal: &Drawn, found: Vec<(&ErrorMode, Diagnostic)>, what: &str) -> Vec<Diagnostic> {
+    if found.is_empty() {
+        return Vec::new();
+    }
+    let views = Views::new(job, nominal);
+    let advise = |(mode, doubt): (&ErrorMode, Diagnostic)| match views.better(mode) {
+        Some(view) => doubt.note(format!("{what}: {}", view.advice())),
+        None => doubt.note(format!("{what}; no view at this distance shows it much better: another light may")),
+    };
+    found.into_iter().map(advise).collect()
 }
 
 /// Shots of all scenes of some draws by a camera.

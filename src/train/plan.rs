@@ -99,15 +99,13 @@ pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, modes: &[ErrorMod
 
 /// See [`Plan::datum`].
 fn datum(good: &ItemBuffer, modes: &[ErrorMode], changes: &[Option<Mask>]) -> Vec<bool> {
-    let misplaced = || (0..modes.len()).filter(|&m| modes[m].kind == FaultKind::Misplaced && changes[m].is_some());
+    let misplaced = || (0..modes.len()).filter(|&m| modes[m].kind == FaultKind::Misplaced);
+    // A part lifted out of its seat changes all over, one in another seat of a pattern hardly.
     let hidden = |id: u32, change: &Mask| {
         let own = || (0..good.id.len()).filter(|&i| good.id[i] == id);
         own().filter(|&i| change.bits[i]).count() as f64 > HIDES * own().count() as f64
     };
-    let firm = |id: u32| {
-        let mut own = misplaced().map(|m| (modes[m].component + 1 == id as usize, changes[m].as_ref()));
-        id != 0 && own.all(|(moved, change)| !moved && !change.is_some_and(|c| hidden(id, c)))
-    };
+    let firm = |id: u32| id != 0 && !misplaced().filter_map(|m| changes[m].as_ref()).any(|change| hidden(id, change));
     let components: BTreeMap<u32, bool> =
         good.id.iter().copied().collect::<BTreeSet<u32>>().into_iter().map(|id| (id, firm(id))).collect();
     good.id.iter().map(|id| components[id]).collect()
