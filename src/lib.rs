@@ -150,5 +150,5 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
     line.enter(Stage::Plan)?;
     let modes = modes();
     let tree = assembly::error_tree::error_tree(&analysis.liaison, 0, None);
-    Some(line::Ready { station: index, camera, modes, tree, design })
+    Some(line::Ready { station: index, camera, modes, liaison: analysis.liaison, tree, design })
 }

@@ -5,6 +5,7 @@ use crate::artifacts::{self, Artifact, pictures};
 use crate::assembly::Analysis;
 use crate::assembly::error_tree::{ErrorTree, object_tree};
 use crate::assembly::fault::ErrorMode;
+use crate::assembly::liaison::Liaison;
 use crate::assembly::piece::Workshop;
 use crate::assembly::place::place;
 use crate::design::Loaded;
@@ -131,6 +132,7 @@ pub(crate) struct Ready {
     pub station: usize,
     pub camera: Camera,
     pub modes: Vec<ErrorMode>,
+    pub liaison: Liaison,
     pub tree: ErrorTree,
 }
 
@@ -141,6 +143,7 @@ impl Ready {
             station: &self.design.stations[self.station],
             camera: self.camera,
             modes: &self.modes,
+            liaison: &self.liaison,
             tree: &self.tree,
             spec: digest(&self.design),
         }

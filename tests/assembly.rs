@@ -159,6 +159,10 @@ part clip {
     add ear  = box(x = 6, y = 5, z = 3) at (-9, 5.5)
     add peg  = 2x cylinder(d = 3, h = 4) at (-8, 0, -4) on line(pitch = 16)
 }
+part label {
+    material = plastic
+    add body = box(x = 9, y = 5, z = 1)
+}
 part ring {
     material = plastic
     add body = cylinder(d = 8, h = 2)
@@ -167,6 +171,11 @@ part ring {
 assembly block {
     root plate
     place clip on plate {
+        z  = 10
+        rz = 0 ±0.5
+    }
+    place label on plate {
+        x  = -22
         z  = 10
         rz = 0 ±0.5
     }
@@ -193,7 +202,7 @@ fn a_clip_on_loose_pegs_can_stand_on_them_or_be_the_wrong_way_round() {
     let modes = fault::modes(&design, &analysis.liaison, &analysis.insertion, &solids);
     let misplaced: Vec<&ErrorMode> = modes.iter().filter(|m| m.kind == FaultKind::Misplaced).collect();
     let names: Vec<&str> = misplaced.iter().map(|m| design.components[m.component].name.as_str()).collect();
-    assert_eq!(names, ["clip", "clip"], "the ring looks alike at any angle");
+    assert_eq!(names, ["clip", "clip", "label"], "the ring looks alike at any angle");
     let poses = place(&design, &nominal);
     let standing = fault::apply(misplaced[0], [0.9, 0.0, 0.0], &solids, &poses);
     let up = standing.pose.unwrap().translation.z - 10.0;
@@ -202,4 +211,6 @@ fn a_clip_on_loose_pegs_can_stand_on_them_or_be_the_wrong_way_round() {
     assert!(reversed.size.abs().to_degrees() > 179.0, "{}", reversed.text);
     let pegs = reversed.pose.unwrap() * Point3::new(8.0, 0.0, -4.0);
     assert!((pegs - Point3::new(-8.0, 0.0, 6.0)).norm() < 0.2, "{pegs}");
+    let askew = fault::apply(misplaced[2], [1.0, 0.0, 0.0], &solids, &poses);
+    assert_eq!(askew.text, "turned 40.0 deg", "nothing keeps it from turning");
 }

@@ -81,6 +81,8 @@ pub struct Faulted {
 const SMALLEST: f64 = 0.8;
 /// The largest that is looked for (mm): what stands higher is as easy to see.
 const LARGEST: f64 = 4.0;
+/// A part lifted by less than this (mm) lies where it should.
+const LYING: f64 = 0.05;
 /// A part thicker than a hole by less than this (mm) is taken to enter it.
 const TIGHT: f64 = 0.005;
 
@@ -133,7 +135,8 @@ pub fn apply(mode: &ErrorMode, u: [f64; 3], solids: &[Arc<Solid>], poses: &[Isom
         Motion::Turn(turn) => {
             let settled = turn.settle(mode.component, u, solids, poses);
             let turned = format!("turned {:.1} deg", settled.angle.to_degrees());
-            let text = if turn.seated { turned } else { format!("{turned} and lifted {:.1} mm", settled.lift) };
+            let lies = settled.lift < LYING;
+            let text = if lies { turned } else { format!("{turned} and lifted {:.1} mm", settled.lift) };
             Faulted { size: settled.angle, pushed: settled.pushed, ..still(settled.pose, &text) }
         }
         Motion::Replace { by, name } => {

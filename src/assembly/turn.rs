@@ -26,7 +26,7 @@ pub struct Turn {
     pub ranges: Vec<[f64; 2]>,
     /// Components that bear it; the others give way.
     pub firm: Vec<usize>,
-    /// At these angles it finds a seat and lies as low as it should; else it lies on what keeps it out.
+    /// At these angles it finds another seat; else it lies on what it meets.
     pub seated: bool,
 }
 
@@ -85,9 +85,10 @@ pub(crate) fn turns(of: &Turning, least: f64) -> Vec<Turn> {
     let trials: Vec<Trial> = axes.iter().map(|axis| Trial::new(of, *axis)).collect();
     let free = of.insertion.is_free(of.component);
     let lifted = trials.iter().filter(|_| free).find_map(|t| t.turn(t.lifted(least), false));
-    let plain = free && lifted.is_none();
-    let seated = trials.iter().find_map(|t| t.turn(t.seats(plain), true));
-    lifted.into_iter().chain(seated).collect()
+    let seated = trials.iter().find_map(|t| t.turn(t.seats(), true));
+    let unstopped = free && lifted.is_none() && seated.is_none();
+    let plain = trials.iter().filter(|_| unstopped).find_map(|t| t.turn(t.plain(), false));
+    lifted.into_iter().chain(seated).chain(plain).collect()
 }
 
 /// A component turned about one axis.
@@ -123,27 +124,27 @@ impl<'a> Trial<'a> {
         [-1.0, 1.0].iter().filter_map(|sign| range(*sign, &lifted)).collect()
     }
 
-    /// Other seats at the angles where patterns repeat and, for a `plain` part that nothing keeps from turning, any angle
-    /// well outside its tolerance.
-    fn seats(&self, plain: bool) -> Vec<[f64; 2]> {
-        let own = self.landing(0.0);
-        let seated = |angle: f64| {
-            let landing = self.landing(angle);
-            let low = landing.lie(false).is_some_and(|l| l.height < IN_SEAT);
-            low && own.looks_unlike(&landing, DIFFERENT) && self.clears(angle)
-        };
-        let zone = self.of.zone;
+    /// Whether the turned component lies as low as it should, keeps clear of what stands above, and looks different.
+    fn seated(&self, angle: f64) -> bool {
+        let landing = self.landing(angle);
+        let low = landing.lie(false).is_some_and(|l| l.height < IN_SEAT);
+        low && self.landing(0.0).looks_unlike(&landing, DIFFERENT) && self.clears(angle)
+    }
+
+    /// Other seats at the angles where patterns repeat.
+    fn seats(&self) -> Vec<[f64; 2]> {
         let wide = |angle: f64| {
-            let ends = [angle - zone, angle + zone];
-            if ends.iter().all(|a| seated(*a)) { ends } else { [angle; 2] }
+            let ends = [angle - self.of.zone, angle + self.of.zone];
+            if ends.iter().all(|a| self.seated(*a)) { ends } else { [angle; 2] }
         };
-        let mut found: Vec<[f64; 2]> = repeats().into_iter().filter(|a| seated(*a)).map(wide).collect();
-        let from = PLAIN.max(PLAIN_ZONES * zone);
-        if plain && found.is_empty() && from < WIDEST {
-            let sides = [[-WIDEST, -from], [from, WIDEST]];
-            found.extend(sides.into_iter().filter(|ends| ends.iter().all(|a| seated(*a))));
-        }
-        found
+        repeats().into_iter().filter(|a| self.seated(*a)).map(wide).collect()
+    }
+
+    /// Any angle well outside the tolerance, of a part that nothing keeps from turning.
+    fn plain(&self) -> Vec<[f64; 2]> {
+        let from = PLAIN.max(PLAIN_ZONES * self.of.zone);
+        let sides = [[-WIDEST, -from], [from, WIDEST]];
+        sides.into_iter().filter(|ends| ends[0] < ends[1] && ends.iter().all(|a| self.seated(*a))).collect()
     }
 
     /// Whether what stands above the component has its place still.

@@ -16,6 +16,7 @@ pub mod verify;
 
 use crate::assembly::error_tree::ErrorTree;
 use crate::assembly::fault::ErrorMode;
+use crate::assembly::liaison::Liaison;
 use crate::design::model::{Design, Response, Station};
 use crate::diag::Diagnostic;
 use crate::runtime::camera::Camera;
@@ -49,6 +50,7 @@ pub struct Job<'a> {
     /// The camera as designed (full resolution).
     pub camera: Camera,
     pub modes: &'a [ErrorMode],
+    pub liaison: &'a Liaison,
     /// The tree of the whole assembly, from the component everything stands on.
     pub tree: &'a ErrorTree,
     /// Digest of the resolved spec.
@@ -72,7 +74,7 @@ pub type Observer<'a> = dyn Fn(Step, usize, usize) + Sync + 'a;
 pub fn train(job: &Job, observer: &Observer) -> Result<(Model, Vec<Diagnostic>), Vec<Diagnostic>> {
     observer(Step::Plan, 0, 1);
     let nominal = shots::nominal(job.design, job.station)?;
-    let plan = plan::plan(job.design, &job.camera, &nominal, job.modes);
+    let plan = plan::plan(job.design, &job.camera, &nominal, job.liaison, job.modes);
     let mut doubts = doubts(job, &plan, &nominal);
     let images = job.design.train.images.max(2);
     let draws = Draws { seed: job.design.train.seed, count: images, faulty: images };

@@ -117,7 +117,15 @@ mod tests {
         let camera = build::camera(spec, Placed { distance: 300.0, elevation: 90f64.to_radians(), azimuth: 0.0 });
         let tree = error_tree::error_tree(&found.liaison, 0, None);
         let station = &design.stations[0];
-        let job = Job { design: &design, station, camera, modes: &modes, tree: &tree, spec: String::new() };
+        let job = Job {
+            design: &design,
+            station,
+            camera,
+            modes: &modes,
+            liaison: &found.liaison,
+            tree: &tree,
+            spec: String::new(),
+        };
         let drawn = super::super::shots::nominal(&design, station).map_err(|_| ()).expect("a nominal draw");
         let views = Views::new(&job, &drawn);
         let raised = modes.iter().find(|m| m.kind == fault::FaultKind::NotSeated).expect("pins can stand too high");

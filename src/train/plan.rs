@@ -5,7 +5,8 @@
 //! so what no fault of the component can touch has no say.
 
 use super::shots::Drawn;
-use crate::assembly::fault::{ErrorMode, FaultKind};
+use crate::assembly::fault::{ErrorMode, Motion};
+use crate::assembly::liaison::Liaison;
 use crate::design::model::{Design, Expr};
 use crate::runtime::camera::Camera;
 use crate::runtime::window::Frame;
@@ -66,13 +67,13 @@ pub struct Plan {
     pub scenes: Vec<Vec<usize>>,
     /// Modes that change next to nothing in the image.
     pub unseen: Vec<usize>,
-    /// Per px of the shots: no misplaced part takes along or hides the component seen there, so it may serve to locate the
+    /// Per px of the shots: no misplaced part carries or covers the component seen there, itself or one it touches, so it may serve to locate the
     /// assembly. A part that is missing or stands too high does not mislead: its edges are few among many.
     pub datum: Vec<bool>,
 }
 
 /// Plans nodes and scenes for the watched components.
-pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, modes: &[ErrorMode]) -> Plan {
+pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, liaison: &Liaison, modes: &[ErrorMode]) -> Plan {
     let base = resolution(design, camera, nominal);
     let small = camera.reduced(base);
     let view = View { drawn: nominal, camera: &small, good: seen(nominal, &[], &small) };
@@ -93,19 +94,25 @@ pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, modes: &[ErrorMod
     link(&mut nodes);
     let scenes = gather(modes, &changes);
     disturb(&mut nodes, &scenes, &changes);
-    let datum = datum(&view.good, modes, &changes);
+    let datum = datum(&view.good, liaison, modes, &changes);
     Plan { base, good: view.good, nodes, scenes, unseen, datum }
 }
 
 /// See [`Plan::datum`].
-fn datum(good: &ItemBuffer, modes: &[ErrorMode], changes: &[Option<Mask>]) -> Vec<bool> {
-    let misplaced = || (0..modes.len()).filter(|&m| modes[m].kind == FaultKind::Misplaced);
-    // A part lifted out of its seat changes all over, one in another seat of a pattern hardly.
+fn datum(good: &ItemBuffer, liaison: &Liaison, modes: &[ErrorMode], changes: &[Option<Mask>]) -> Vec<bool> {
+    // A part in another seat stays where it is: it does not mislead.
+    let misplaced = || (0..modes.len()).filter(|&m| matches!(&modes[m].motion, Motion::Turn(turn) if !turn.seated));
     let hidden = |id: u32, change: &Mask| {
         let own = || (0..good.id.len()).filter(|&i| good.id[i] == id);
         own().filter(|&i| change.bits[i]).count() as f64 > HIDES * own().count() as f64
     };
-    let firm = |id: u32| id != 0 && !misplaced().filter_map(|m| changes[m].as_ref()).any(|change| hidden(id, change));
+    // What does not touch the misplaced part shows through or beside it, wherever that lies.
+    let near = |m: usize, id: u32| {
+        let (of, component) = (modes[m].component, id as usize - 1);
+        component == of || liaison.neighbours(of).contains(&component)
+    };
+    let carried = |m: usize, id: u32| near(m, id) && changes[m].as_ref().is_some_and(|change| hidden(id, change));
+    let firm = |id: u32| id != 0 && !misplaced().any(|m| carried(m, id));
     let components: BTreeMap<u32, bool> =
         good.id.iter().copied().collect::<BTreeSet<u32>>().into_iter().map(|id| (id, firm(id))).collect();
     good.id.iter().map(|id| components[id]).collect()

@@ -43,7 +43,7 @@ const FIRST_CUSTOMER: u64 = 1_000;
 pub fn prove(job: &Job, model: &Model, trials: Trials, observer: &Observer) -> Result<Proof, Vec<Diagnostic>> {
     observer(Step::Plan, 0, 1);
     let nominal = shots::nominal(job.design, job.station)?;
-    let plan = plan::plan(job.design, &job.camera, &nominal, job.modes);
+    let plan = plan::plan(job.design, &job.camera, &nominal, job.liaison, job.modes);
     let customers = trials.customers.max(1);
     // The first good shot of a customer calibrates.
     let goods = trials.goods.div_ceil(customers) + 1;
