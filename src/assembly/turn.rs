@@ -85,10 +85,11 @@ pub(crate) fn turns(of: &Turning, least: f64) -> Vec<Turn> {
     let trials: Vec<Trial> = axes.iter().map(|axis| Trial::new(of, *axis)).collect();
     let free = of.insertion.is_free(of.component);
     let lifted = trials.iter().filter(|_| free).find_map(|t| t.turn(t.lifted(least), false));
-    let seated = trials.iter().find_map(|t| t.turn(t.seats(), true));
-    let unstopped = free && lifted.is_none() && seated.is_none();
+    let unstopped = free && lifted.is_none();
     let plain = trials.iter().filter(|_| unstopped).find_map(|t| t.turn(t.plain(), false));
-    lifted.into_iter().chain(seated).chain(plain).collect()
+    let stopped = plain.is_none();
+    let seated = trials.iter().filter(|_| stopped).find_map(|t| t.turn(t.seats(), true));
+    lifted.into_iter().chain(plain).chain(seated).collect()
 }
 
 /// A component turned about one axis.
