@@ -54,8 +54,8 @@ const REPEATS: [u32; 6] = [2, 3, 4, 5, 6, 8];
 const IN_SEAT: f64 = 0.1;
 /// A turned part looks different where its surface is higher or lower by more than this (mm).
 const DIFFERENT: f64 = 0.3;
-/// A part without anything that keeps it from turning is misplaced from this angle on (rad), or from this many times the
-/// half width of its tolerance.
+/// A part without anything that keeps it from turning is tried at multiples of this angle (rad), beyond this many times
+/// the half width of its tolerance.
 const PLAIN: f64 = 5.0 * TAU / 360.0;
 const PLAIN_ZONES: f64 = 3.0;
 /// Directions that differ by less than this sine are parallel.
@@ -141,11 +141,15 @@ impl<'a> Trial<'a> {
         repeats().into_iter().filter(|a| self.seated(*a)).map(wide).collect()
     }
 
-    /// Any angle well outside the tolerance, of a part that nothing keeps from turning.
+    /// Any angle well outside the tolerance from which on it looks different, of a part that nothing keeps from turning.
     fn plain(&self) -> Vec<[f64; 2]> {
-        let from = PLAIN.max(PLAIN_ZONES * self.of.zone);
-        let sides = [[-WIDEST, -from], [from, WIDEST]];
-        sides.into_iter().filter(|ends| ends[0] < ends[1] && ends.iter().all(|a| self.seated(*a))).collect()
+        let side = |sign: f64| {
+            let angles = (1..).map(|k| PLAIN * f64::from(k)).take_while(|a| *a < WIDEST);
+            let from = angles.filter(|a| *a >= PLAIN_ZONES * self.of.zone).find(|a| self.seated(sign * a))?;
+            let ends = [sign * from, sign * WIDEST];
+            self.seated(ends[1]).then_some([ends[0].min(ends[1]), ends[0].max(ends[1])])
+        };
+        [-1.0, 1.0].into_iter().filter_map(side).collect()
     }
 
     /// Whether what stands above the component has its place still.
