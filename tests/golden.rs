@@ -129,7 +129,7 @@ const CONTACTS: &str = "golden/plate/contacts.ron";
 fn a_number_a_word_a_lost_and_a_new_entry_are_named_by_path() {
     let bench = Bench::new("differences", "contacts");
     let blessed = bench.read(CONTACTS);
-    bench.run("check", &["--stage", "contacts"]).expect(0, "golden/plate: 1 golden agree");
+    bench.run("check", &["--stage", "contacts"]).expect(0, "golden/plate: 1 golden agrees");
     let cases = [
         ("mmc: 0.004", "mmc: 0.005", "contacts.ron: contacts[0].gap.mmc: 0.005 blessed, 0.004 now"),
         ("kind: Cylinder", "kind: Cone", "contacts[0].kind: Cone blessed, Cylinder now"),

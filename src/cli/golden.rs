@@ -34,7 +34,12 @@ pub fn check(args: &GoldenCheck, global: &Global) -> Result<Exit, Failure> {
         }
         case.tell_strangers();
         if faulty.is_empty() {
-            output::line(&format!("{}: {} agree", case.folder.display(), count(verdicts.len(), "golden")))?;
+            let agree = if verdicts.len() == 1 {
+                "1 golden agrees".into()
+            } else {
+                format!("{} goldens agree", verdicts.len())
+            };
+            output::line(&format!("{}: {agree}", case.folder.display()))?;
         } else {
             output::remark(&format!("  to bless what is right: {}", case.command(&faulty, &args.golden.dir)));
             exit = Exit::Faults;
@@ -441,9 +446,4 @@ impl Change<'_> {
             _ => Ok(()),
         }
     }
-}
-
-/// `1 golden`, `3 goldens`
-fn count(number: usize, what: &str) -> String {
-    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
