@@ -394,6 +394,24 @@ fn the_command_reference_has_every_command_and_option() {
     assert!(missing.is_empty(), "the command line reference does not tell of {missing:#?}");
 }
 
+#[test]
+fn the_page_on_goldens_has_the_tolerances_that_are_written_first() {
+    let page = chapter("golden_files.md");
+    let table = page.split("## Tolerances").nth(1).unwrap();
+    for stage in Artifact::ALL.into_iter().filter(|a| a.is_reviewed()) {
+        let name = format!("`{}`", stage.name());
+        let row = table.lines().find(|l| l.starts_with('|') && l.split('|').nth(1).is_some_and(|c| c.contains(&name)));
+        for rule in gonogo::golden::usual(&stage.stem()).lines() {
+            let (subject, amount) = rule.split_once(':').unwrap();
+            let row = row.unwrap_or_else(|| panic!("no row for {name}"));
+            let amount = amount.replace(" ±0 %", "");
+            assert!(row.contains(amount.trim()), "{name}: `{rule}` is not in {row}");
+            let field = subject.strip_prefix("// tolerance of ");
+            assert!(field.is_none_or(|f| row.contains(&format!("`{f}`"))), "{name}: `{rule}` is not in {row}");
+        }
+    }
+}
+
 // --- Other languages -------------------------------------------------------------------------------------------------
 
 #[test]
