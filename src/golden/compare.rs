@@ -77,7 +77,9 @@ impl<'a> Judge<'_, 'a> {
                     met[j] = true;
                     let own = self.tolerances.named.get(key).copied().or(own);
                     self.compare(value, other, own);
-                    moved = moved.or((i != j && blessed.len() == now.len()).then_some((key, &now[i].0)));
+                    // With as many on either side, another place is another order and not the trace of one that is lost.
+                    let displaced = i != j && blessed.len() == now.len();
+                    moved = moved.or_else(|| now.get(i).filter(|_| displaced).map(|(first, _)| (key, first)));
                 }
                 None => self.differ(value.show(), NOTHING.into()),
             }
