@@ -59,6 +59,11 @@ mod line;
 #[cfg(feature = "cli")]
 pub mod cli;
 
+/// The Rust of the book is compiled and run as tests of rustdoc.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/src/embedding.md")]
+mod book {}
+
 #[cfg(feature = "compile")]
 pub use line::{Compiled, Made, Observer, Options, Progress, Stage};
 

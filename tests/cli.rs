@@ -433,6 +433,6 @@ fn a_golden_that_is_missing_or_differs_fails_and_names_the_place() {
     folder.run(&check).expect(0, &[]);
     let blessed = folder.read("golden/plate/liaison.ron");
     folder.file("golden/plate/liaison.ron", blessed.replacen("75.4", "80.0", 1));
-    folder.run(&check).expect(1, &["liaison.ron", "area: expected 80.0, is 75.4"]);
+    folder.run(&check).expect(1, &["liaison.ron", "area: 80.0 blessed, 75.4 now"]);
     assert_eq!(folder.read("target/golden/plate/liaison.ron"), blessed);
 }

@@ -30,7 +30,7 @@ const EQUAL: f64 = 0.1;
 #[test]
 fn the_documentation_shows_what_the_code_draws() {
     let files = wheel();
-    let folder = root().join("docs/pattern_wheel");
+    let folder = root().join("docs/src/pattern_wheel");
     let bless = std::env::var_os("GONOGO_BLESS").is_some_and(|v| v == "1");
     let in_ci = std::env::var_os("CI").is_some_and(|v| !v.is_empty());
     for (name, source) in PRINTED {

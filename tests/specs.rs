@@ -179,32 +179,6 @@ fn shapes_of_every_kind_make_a_design() {
     assert_eq!(design.measures[0].from.face, "rail.top");
 }
 
-/// Code blocks of the manual, marked with what they are lines of: a `part`, the `assembly`, or a whole spec.
-#[test]
-fn examples_of_the_manual_compile() {
-    let manual = read("docs/language.md").unwrap();
-    let blocks: Vec<&str> = manual.split("```gng").skip(1).map(|b| b.split("```").next().unwrap()).collect();
-    assert!(blocks.len() >= 5);
-    for block in blocks {
-        let (kind, lines) = block.split_once('\n').unwrap();
-        let part = |lines: &str| format!("part plate {{\n    material = steel\n{lines}}}\n");
-        let plate = "    add slab = box(x = 80, y = 50, z = 10)\n    cut bore = 3x cylinder(d = 6, h = through) on circle(d = 36)\n";
-        let pin = "part pin {\n    material = steel\n    add shank = cylinder(d = 6, h = 18)\n}\n";
-        let (plate, pin, placed) = match kind.trim() {
-            "part" => (part(lines), "", String::new()),
-            "assembly" => (part(plate), pin, format!("    place pin = 3x pin on plate.bore\n{lines}")),
-            other => panic!("a block of `{other}`"),
-        };
-        let text = format!(
-            "gonogo 1\ntolerances ISO2768-m\nmaterial steel {{\n    metal = steel\n}}\n{plate}{pin}\
-             assembly plate {{\n    root plate\n{placed}}}\nstation bench {{\n    light room = room(patches = 9)\n}}\n"
-        );
-        let loaded = load("manual.gng", &|_| Ok(text.clone()), &[]);
-        assert!(loaded.diagnostics.is_empty(), "{:#?}\n{text}", loaded.diagnostics);
-        solids_keep_their_faces(&loaded.design.unwrap());
-    }
-}
-
 #[test]
 fn the_spec_of_all_shapes_keeps_its_faces_within_tolerance() {
     solids_keep_their_faces(&design("shapes"));

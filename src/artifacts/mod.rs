@@ -5,10 +5,13 @@
 
 pub mod exchange;
 pub mod images;
+mod model;
 pub mod pictures;
 
+pub use model::model_summary;
+
 use crate::assembly::Analysis;
-use crate::assembly::contact::{Contact, FaceRef};
+use crate::assembly::contact::{Contact, ContactKind, FaceRef, Fit};
 use crate::assembly::error_tree::{self, ErrorTree};
 use crate::assembly::place::place;
 use crate::assembly::{insertion, liaison};
@@ -17,7 +20,6 @@ use crate::design::model::{
 };
 use crate::line::Stage;
 use crate::runtime::camera::Camera;
-use crate::runtime::model::{Hypothesis, Model, Node};
 use crate::solid::{Solid, Surface};
 use crate::units::{Quantity, Range};
 use crate::view::choose::Choice;
@@ -106,6 +108,11 @@ impl Artifact {
         }
     }
 
+    /// Whether it has a text for people, to be blessed; the others are the same in the formats of other programs.
+    pub fn is_reviewed(self) -> bool {
+        !matches!(self, Artifact::Step | Artifact::Gltf | Artifact::Exploded)
+    }
+
     /// `error_trees`
     pub fn stem(self) -> String {
         self.name().replace('-', "_")
@@ -169,6 +176,8 @@ struct DesignSummary<'a> {
 
 #[derive(Serialize)]
 struct PartSummary<'a> {
+    /// The part that the piece is one of.
+    of: &'a str,
     material: &'a str,
     /// Operation, shape, number of copies.
     features: Named<(Op, &'static str, usize)>,
@@ -187,7 +196,7 @@ pub fn design(design: &Design) -> String {
     let summary = DesignSummary {
         name: &design.name,
         dimensions: Named(design.dims.iter().map(|d| (d.name.clone(), limits(d))).collect()),
-        parts: Named(design.parts.iter().map(|p| (p.name.clone(), part(design, p))).collect()),
+        parts: Named(design.parts.iter().enumerate().map(|(i, p)| (piece(design, i), part(design, p))).collect()),
         components: Named(design.components.iter().map(|c| component(design, c)).collect()),
         measures: Named(design.measures.iter().map(|m| (m.name.clone(), measure(design, m))).collect()),
         stations: Named(design.stations.iter().map(|s| (s.name.clone(), station(design, s))).collect()),
@@ -204,9 +213,16 @@ fn limits(dim: &Dimension) -> [f64; 5] {
     [low, nominal, high, dim.mmc, dim.lmc].map(|v| rounded(unit(v), 5))
 }
 
+/// A piece of a part by the component it is, since every component has draws of its own.
+fn piece(design: &Design, part: usize) -> String {
+    let component = design.components.iter().find(|c| c.part == part);
+    component.map_or(&design.parts[part].name, |c| &c.name).clone()
+}
+
 fn part<'a>(design: &'a Design, part: &'a Part) -> PartSummary<'a> {
     let feature = |f: &Feature| (f.name.clone(), (f.op, shape(f), f.copies.len()));
     PartSummary {
+        of: &part.name,
         material: &design.materials[part.material].name,
         features: Named(part.features.iter().map(feature).collect()),
     }
@@ -269,6 +285,7 @@ struct SolidSummary {
     cylinders: usize,
     cones: usize,
     spheres: usize,
+    tori: usize,
     edges: usize,
     vertices: usize,
     /// mm² and mm³.
@@ -282,7 +299,7 @@ pub fn brep(design: &Design, limits: &[[Arc<Solid>; 3]]) -> String {
         let names = ["nominal", "mmc", "lmc"].map(String::from);
         Named(names.into_iter().zip(solids.iter().map(|s| solid(s))).collect())
     };
-    let parts = design.parts.iter().zip(limits).map(|(part, solids)| (part.name.clone(), of_part(solids)));
+    let parts = limits.iter().enumerate().map(|(part, solids)| (piece(design, part), of_part(solids)));
     ron(2, &Named(parts.collect()))
 }
 
@@ -293,6 +310,7 @@ fn solid(solid: &Solid) -> SolidSummary {
         cylinders: count(|s| matches!(s, Surface::Cylinder { .. })),
         cones: count(|s| matches!(s, Surface::Cone { .. })),
         spheres: count(|s| matches!(s, Surface::Sphere { .. })),
+        tori: count(|s| matches!(s, Surface::Torus { .. })),
         edges: solid.edges.len(),
         vertices: solid.vertices.len(),
         area: rounded(solid.area, 3),
@@ -302,16 +320,40 @@ fn solid(solid: &Solid) -> SolidSummary {
 
 // --- The assembly ----------------------------------------------------------------------------------------------------
 
-/// Every pair of faces that touch: their names, the kind of contact, the common area (mm²), the gap at nominal, MMC and
-/// LMC (mm) and the fit.
+#[derive(Serialize)]
+struct ContactSummary {
+    faces: [String; 2],
+    kind: ContactKind,
+    /// mm²
+    area: f64,
+    gap: GapSummary,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fit: Option<Fit>,
+}
+
+/// mm
+#[derive(Serialize)]
+struct GapSummary {
+    nominal: f64,
+    mmc: f64,
+    lmc: f64,
+}
+
+/// Every pair of faces that touch.
 pub fn contacts(design: &Design, solids: &[Arc<Solid>], analysis: &Analysis) -> String {
-    let line = |c: &Contact| {
-        let faces = [c.a, c.b].map(|f| face(design, solids, f));
-        let gap = [c.gap, c.gap_range[0], c.gap_range[1]].map(|g| rounded(g, 4));
-        (faces, c.kind, rounded(c.area, 2), gap, c.fit)
+    let gap = |c: &Contact| {
+        let [nominal, mmc, lmc] = [c.gap, c.gap_range[0], c.gap_range[1]].map(|g| rounded(g, 4));
+        GapSummary { nominal, mmc, lmc }
+    };
+    let line = |c: &Contact| ContactSummary {
+        faces: [c.a, c.b].map(|f| face(design, solids, f)),
+        kind: c.kind,
+        area: rounded(c.area, 2),
+        gap: gap(c),
+        fit: c.fit,
     };
     let list: Vec<_> = analysis.liaison.contacts.iter().map(line).collect();
-    format!("// faces, kind, area in mm², gap in mm (nominal, MMC, LMC), fit\n{}", ron(1, &list))
+    format!("// area in mm², gap in mm\n{}", ron(1, &list))
 }
 
 /// `gear.bore.side`
@@ -414,71 +456,4 @@ pub fn view(design: &Design, station: &Station, choice: &Choice) -> String {
         seen: Named(seen.collect()),
     };
     ron(2, &summary)
-}
-
-// --- The model -------------------------------------------------------------------------------------------------------
-
-#[derive(Serialize)]
-struct ModelSummary<'a> {
-    writer: &'a str,
-    assembly: &'a str,
-    seed: u64,
-    station: &'a crate::runtime::model::Station,
-    promise: &'a crate::runtime::model::Promise,
-    /// Groups of the locator: alternatives, fine points.
-    locator: Named<(usize, usize)>,
-    nodes: Named<NodeSummary<'a>>,
-}
-
-#[derive(Serialize)]
-struct NodeSummary<'a> {
-    level: u32,
-    plane: f64,
-    factor: u32,
-    origin: [i32; 2],
-    size: [u32; 2],
-    mask_pixels: u32,
-    threshold: f64,
-    /// Fault, sweep, images, mean and standard deviation of the integers.
-    hypotheses: Vec<(&'a str, &'a str, usize, f64, f64)>,
-}
-
-/// The model with every image reduced to its mean and spread.
-pub fn model_summary(model: &Model) -> String {
-    let groups = model.locator.groups.iter().map(|g| {
-        let points = g.alternatives.iter().map(|a| a.fine.len()).sum();
-        (g.name.clone(), (g.alternatives.len(), points))
-    });
-    let summary = ModelSummary {
-        writer: &model.writer,
-        assembly: &model.assembly,
-        seed: model.seed,
-        station: &model.station,
-        promise: &model.promise,
-        locator: Named(groups.collect()),
-        nodes: Named(model.nodes.iter().map(|n| (n.name.clone(), node(n))).collect()),
-    };
-    ron(4, &summary)
-}
-
-fn node(node: &Node) -> NodeSummary<'_> {
-    NodeSummary {
-        level: node.level,
-        plane: rounded(node.plane, 3),
-        factor: node.factor,
-        origin: node.origin,
-        size: node.size,
-        mask_pixels: node.mask.iter().flat_map(|row| row.chunks(2)).map(|run| run[1]).sum(),
-        threshold: rounded(node.threshold, 4),
-        hypotheses: node.hypotheses.iter().map(hypothesis).collect(),
-    }
-}
-
-fn hypothesis(hypothesis: &Hypothesis) -> (&str, &str, usize, f64, f64) {
-    let values = || hypothesis.images.iter().flat_map(|i| i.rows.iter().flat_map(|row| &row.0)).map(|&v| f64::from(v));
-    let count = values().count().max(1) as f64;
-    let mean = values().sum::<f64>() / count;
-    let spread = (values().map(|v| (v - mean).powi(2)).sum::<f64>() / count).sqrt();
-    let (mean, spread) = (rounded(mean, 2), rounded(spread, 2));
-    (&hypothesis.fault, &hypothesis.sweep, hypothesis.images.len(), mean, spread)
 }

@@ -237,10 +237,10 @@ pub struct Explain {
 
 #[derive(Debug, Subcommand)]
 pub enum Golden {
-    /// Compare; exit code 1 if anything differs or is missing.
-    Check(GoldenArgs),
-    /// Rewrite the blessed outputs. Refused when CI is set.
-    Bless(GoldenArgs),
+    /// Compare; exit code 1 if anything differs, is missing or is not made any more.
+    Check(GoldenCheck),
+    /// Rewrite the blessed outputs that differ, and say what changes. Refused when CI is set.
+    Bless(GoldenBless),
 }
 
 #[derive(Debug, Args)]
@@ -250,15 +250,36 @@ pub struct GoldenArgs {
     /// The folder of blessed outputs, one folder a spec in it.
     #[arg(long, value_name = "DIR", default_value = "golden")]
     pub dir: PathBuf,
-    /// The stages to compare.
-    #[arg(long, value_name = "STAGE,…", value_delimiter = ',', value_parser = stages(),
-          default_value = "design,brep,contacts,liaison,error-trees,insertion,view")]
+    /// The stages to compare. Default: all that need no rendering, and those that were blessed.
+    #[arg(long = "stage", visible_alias = "stages", value_name = "STAGE,…", value_delimiter = ',',
+          value_parser = reviewed_stages())]
     pub stages: Vec<Artifact>,
+    /// Print all that differs as a unified diff.
+    #[arg(long)]
+    pub diff: bool,
+    #[command(flatten)]
+    pub jobs: Jobs,
+}
+
+#[derive(Debug, Args)]
+pub struct GoldenCheck {
+    #[command(flatten)]
+    pub golden: GoldenArgs,
     /// Where outputs that differ are kept.
     #[arg(long, value_name = "DIR", default_value = "target/golden")]
     pub keep: PathBuf,
+    /// Keep outputs that differ beside the blessed ones instead, as `contacts.now.ron`.
+    #[arg(long, conflicts_with = "keep")]
+    pub beside: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct GoldenBless {
     #[command(flatten)]
-    pub jobs: Jobs,
+    pub golden: GoldenArgs,
+    /// Say what would change and change nothing.
+    #[arg(long)]
+    pub dry_run: bool,
 }
 
 #[derive(Debug, Args)]
@@ -271,7 +292,16 @@ pub struct Demo {
 }
 
 fn stages() -> impl TypedValueParser<Value = Artifact> {
-    let names = Artifact::ALL.iter().map(|s| s.name());
+    among(|_| true)
+}
+
+/// The stages whose outputs people review.
+fn reviewed_stages() -> impl TypedValueParser<Value = Artifact> {
+    among(Artifact::is_reviewed)
+}
+
+fn among(counts: fn(Artifact) -> bool) -> impl TypedValueParser<Value = Artifact> {
+    let names = Artifact::ALL.iter().filter(|s| counts(**s)).map(|s| s.name());
     PossibleValuesParser::new(names).try_map(|s| Artifact::named(&s).ok_or("no such stage"))
 }
 

@@ -1,6 +1,6 @@
 //! `station`: camera, lights, floor, and what varies from photo to photo.
 //!
-//! Every field has a default; docs/language.md lists them.
+//! Every field has a default; docs/src/language.md lists them.
 
 use super::fields::Fields;
 use super::model::{CameraPlacing, CameraSpec, Floor, LightShape, LightSpec, Response, Station};
