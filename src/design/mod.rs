@@ -24,7 +24,9 @@ mod sense;
 mod shape;
 mod station;
 mod sum;
+mod survey;
 mod task;
 mod tolerance;
 
-pub use load::{Loaded, Read, load};
+pub use load::{Loaded, Read, beside, load};
+pub use survey::{Reading, Survey, survey};
