@@ -58,6 +58,8 @@ mod line;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "cli")]
+pub mod lsp;
 
 #[cfg(feature = "compile")]
 pub use line::{Compiled, Made, Observer, Options, Progress, Stage};

@@ -9,6 +9,7 @@ mod font;
 mod format;
 mod golden;
 mod judge;
+mod lsp;
 mod messages;
 mod output;
 mod overlay;
@@ -64,6 +65,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Golden(Golden::Check(args)) => golden::check(args, global),
         Command::Golden(Golden::Bless(args)) => golden::bless(args, global),
         Command::Demo(args) => demo::demo(args, global),
+        Command::Lsp(_) => lsp::lsp(),
     }
 }
 
