@@ -260,6 +260,9 @@ pub(crate) fn shapes(design: &Design) -> Result<Vec<[Arc<Solid>; 3]>, Vec<Diagno
     let limits = [design.nominal(), design.mmc(), design.lmc()];
     let (mut shapes, mut faults, mut workshop) = (Vec::new(), Vec::new(), Workshop::default());
     let mut compared = BTreeSet::new();
+    let pieces: Vec<_> =
+        design.parts.iter().flat_map(|part| limits.iter().map(move |values| (part, values.as_slice()))).collect();
+    workshop.prepare(&pieces, &Quality::default());
     for part in &design.parts {
         match at_limits(part, &limits, &mut workshop) {
             Ok(solids) => {
