@@ -58,6 +58,8 @@ mod line;
 
 #[cfg(feature = "cli")]
 pub mod cli;
+#[cfg(feature = "cli")]
+pub mod lsp;
 
 /// The Rust of the book is compiled and run as tests of rustdoc.
 #[cfg(doctest)]

@@ -22,6 +22,7 @@ use crate::train::{Job, Step, shots};
 use crate::view::choose::Choice;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What to make of a spec.
 #[derive(Debug, Clone, Default)]
@@ -34,6 +35,8 @@ pub struct Options {
     pub wanted: BTreeSet<Artifact>,
     /// Keep what the stages make on the way, for a report.
     pub keep: bool,
+    /// Set from outside when nobody waits for the result any more: no further stage begins.
+    pub stop: Option<Arc<AtomicBool>>,
 }
 
 /// What came of a spec.
@@ -164,9 +167,10 @@ impl<'a> Line<'a> {
         Line { options, observer, out: Compiled::default(), last }
     }
 
-    /// Begins a stage, unless nothing from here on was asked for.
+    /// Begins a stage, unless nothing from here on was asked for or nobody waits for it any more.
     pub fn enter(&mut self, stage: Stage) -> Option<()> {
-        (stage <= self.last).then(|| self.tell(stage, 0, 1))
+        let stopped = self.options.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
+        (stage <= self.last && !stopped).then(|| self.tell(stage, 0, 1))
     }
 
     pub fn tell(&self, stage: Stage, done: usize, total: usize) {
@@ -256,6 +260,9 @@ pub(crate) fn shapes(design: &Design) -> Result<Vec<[Arc<Solid>; 3]>, Vec<Diagno
     let limits = [design.nominal(), design.mmc(), design.lmc()];
     let (mut shapes, mut faults, mut workshop) = (Vec::new(), Vec::new(), Workshop::default());
     let mut compared = BTreeSet::new();
+    let pieces: Vec<_> =
+        design.parts.iter().flat_map(|part| limits.iter().map(move |values| (part, values.as_slice()))).collect();
+    workshop.prepare(&pieces, &Quality::default());
     for part in &design.parts {
         match at_limits(part, &limits, &mut workshop) {
             Ok(solids) => {

@@ -30,6 +30,7 @@ const HOUSE: &[(&str, &[&str])] = &[
         &["train", "view", "scene", "exchange", "drawing", "assembly", "solid", "design", "runtime", "diag", "units"],
     ),
     ("golden", &[]),
+    ("lsp", &["design", "syntax", "iso", "diag", "units"]),
     (
         "artifacts",
         &[
@@ -52,7 +53,9 @@ const DOORS: &[(&str, &[&str])] = &[
     ("annotate_snippets", &["cli/"]),
     ("anstream", &["cli/"]),
     ("indicatif", &["cli/"]),
-    ("serde_json", &["cli/", "drawing/json.rs"]),
+    ("serde_json", &["cli/", "lsp/", "drawing/json.rs"]),
+    ("lsp_server", &["cli/"]),
+    ("lsp_types", &["cli/", "lsp/"]),
 ];
 
 /// What only the command line does.

@@ -7,6 +7,7 @@
 use crate::design::model::{Corner, Extent, Feature, Outline, OutlinePath, Part, PoseExpr, Shape, Values};
 use crate::diag::Diagnostic;
 use crate::solid::{Quality, Solid, evaluate};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -26,6 +27,21 @@ impl Workshop {
         let solid = Arc::new(evaluate(part, values, quality)?);
         self.known.insert(key, solid.clone());
         Ok(solid)
+    }
+
+    /// Makes the solids of these pieces that are not there yet, on all threads. What cannot be made is left out:
+    /// [`Workshop::solid`] says why.
+    pub fn prepare(&mut self, pieces: &[(&Part, &Values)], quality: &Quality) {
+        let mut wanted: BTreeMap<Vec<u64>, (&Part, &Values)> = BTreeMap::new();
+        for &(part, values) in pieces {
+            let key = key(part, values);
+            if !self.known.contains_key(&key) {
+                wanted.entry(key).or_insert((part, values));
+            }
+        }
+        let make = |(key, (part, values))| Some((key, Arc::new(evaluate(part, values, quality).ok()?)));
+        let made: Vec<(Vec<u64>, Arc<Solid>)> = wanted.into_par_iter().filter_map(make).collect();
+        self.known.extend(made);
     }
 
     /// How many distinct solids were made.

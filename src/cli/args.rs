@@ -75,6 +75,15 @@ pub enum Command {
     Golden(Golden),
     /// Compile the pattern wheel, calibrate it, and judge the photos that come with it.
     Demo(Demo),
+    /// Serve editors: the Language Server Protocol on standard input and output.
+    Lsp(Lsp),
+}
+
+#[derive(Debug, Args)]
+pub struct Lsp {
+    /// The only way there is; editors say so by custom.
+    #[arg(long)]
+    pub stdio: bool,
 }
 
 #[derive(Debug, Args)]

@@ -25,7 +25,7 @@ pub fn compile(args: &Compile, global: &Global) -> Result<Exit, Failure> {
         station: args.station.clone(),
         set: args.variant.set.clone(),
         wanted: outputs.wanted.clone(),
-        keep: false,
+        ..Options::default()
     };
     let compiled = args.jobs.run(|| run(&spec, &options, global))?;
     if !report(&compiled, &args.variant, global)? {
@@ -51,7 +51,7 @@ pub fn check(args: &Check, global: &Global) -> Result<Exit, Failure> {
             station: None,
             set: args.variant.set.clone(),
             wanted: BTreeSet::from([Artifact::View]),
-            keep: false,
+            ..Options::default()
         };
         let spec = if args.fix { fix::mended(spec, path, &options)? } else { spec };
         let compiled = run(&spec, &options, global);

@@ -11,6 +11,7 @@ mod font;
 mod format;
 mod golden;
 mod judge;
+mod lsp;
 mod messages;
 mod output;
 mod overlay;
@@ -69,6 +70,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Golden(Golden::Check(args)) => golden::check(args, global),
         Command::Golden(Golden::Bless(args)) => golden::bless(args, global),
         Command::Demo(args) => demo::demo(args, global),
+        Command::Lsp(_) => lsp::lsp(),
     }
 }
 

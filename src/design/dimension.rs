@@ -40,7 +40,9 @@ impl Resolver {
     pub fn dimension(&mut self, dim: &ast::Dim, want: Quantity, general: General, name: &str) -> Option<Expr> {
         let typed = self.value(dim, Use::Shared, general, name, Some(want))?;
         let expr = self.coerce(typed, want, dim.span)?;
-        self.finite(expr, want, dim.span)
+        let expr = self.finite(expr, want, dim.span)?;
+        self.note_reading(dim.span, want, &expr);
+        Some(expr)
     }
 
     /// The range of a value that is not sampled with the parts: a material, a camera, a lamp.
@@ -50,7 +52,9 @@ impl Resolver {
         let scaled = |v: f64| v * scale;
         let Range { low, nominal, high } = limited.range;
         let range = Range { low: scaled(low), nominal: scaled(nominal), high: scaled(high) };
-        self.in_bounds(range, want, dim.span)
+        let range = self.in_bounds(range, want, dim.span)?;
+        self.note_range(dim.span, want, range);
+        Some(range)
     }
 
     /// A named dimension. Without a unit it is a length.
@@ -62,7 +66,11 @@ impl Resolver {
         let typed = self.value(&named.dim, usage, General::Applies, &named.path, None)?;
         let quantity = typed.quantity.unwrap_or(Quantity::Length);
         let expr = self.coerce(typed, quantity, named.dim.span)?;
-        Some(Typed { expr: self.finite(expr, quantity, named.dim.span)?, quantity: Some(quantity) })
+        let expr = self.finite(expr, quantity, named.dim.span)?;
+        if usage == Use::Shared {
+            self.note_reading(named.dim.span, quantity, &expr);
+        }
+        Some(Typed { expr, quantity: Some(quantity) })
     }
 
     fn value(

@@ -40,6 +40,19 @@ pub type Read<'a> = &'a dyn Fn(&str) -> io::Result<String>;
 ///
 /// Faults of the spec and files that cannot be read are diagnostics.
 pub fn load(path: &str, read: Read, set: &[(String, String)]) -> Loaded {
+    load_with(path, read, set, Resolver::default()).loaded
+}
+
+/// What loading leaves behind, for those who ask for more than the design.
+pub(super) struct Outcome {
+    pub loaded: Loaded,
+    pub trees: Vec<Tree>,
+    pub resolver: Resolver,
+}
+
+/// Loads with a resolver that may be told to keep its readings. It then resolves what could be read even where the spec
+/// does not parse.
+pub(super) fn load_with(path: &str, read: Read, set: &[(String, String)], mut resolver: Resolver) -> Outcome {
     let mut loader =
         Loader { read, sources: Sources::default(), trees: Vec::new(), diagnostics: Vec::new(), open: Vec::new() };
     loader.file(path, None);
@@ -48,16 +61,21 @@ pub fn load(path: &str, read: Read, set: &[(String, String)]) -> Loaded {
     let text = digest_text(&loader.sources);
     let Loader { sources, trees, mut diagnostics, .. } = loader;
     let mut design = None;
-    if beside::is_worth_resolving(&diagnostics, &trees, &sources) {
-        let (resolved, found) = resolve(&trees, &overrides);
-        design = resolved;
-        diagnostics.extend(beside::independent(found, &trees, &sources));
+    let worth = beside::is_worth_resolving(&diagnostics, &trees, &sources);
+    if worth || resolver.readings.is_some() {
+        let resolved = resolve(&mut resolver, &trees, &overrides);
+        let found = std::mem::take(&mut resolver.diagnostics);
+        // What is missing from a spec that does not parse may only not have been read.
+        if worth {
+            design = Some(resolved);
+            diagnostics.extend(beside::independent(found, &trees, &sources));
+        }
     }
     tidy(&mut diagnostics);
     if diagnostics.iter().any(Diagnostic::is_error) {
         design = None;
     }
-    Loaded { sources, design, diagnostics, inputs, text }
+    Outcome { loaded: Loaded { sources, design, diagnostics, inputs, text }, trees, resolver }
 }
 
 /// Every text with its length in front, so that no two specs run together into the same text.
@@ -119,7 +137,7 @@ impl Loader<'_> {
         let uses: Vec<ast::Name> = tree.lines.iter().filter_map(as_use).cloned().collect();
         self.trees.push(Tree { file, used: from.is_some(), tree });
         for name in uses {
-            self.file(&relative(path, &name.text), Some(name.span));
+            self.file(&path_beside(path, &name.text), Some(name.span));
         }
         self.open.pop();
     }
@@ -209,7 +227,7 @@ fn as_use(line: &ast::Line) -> Option<&ast::Name> {
 }
 
 /// The name of a file that `path` refers to as `name`, with `.` and `..` resolved as far as they can be.
-fn relative(path: &str, name: &str) -> String {
+pub fn path_beside(path: &str, name: &str) -> String {
     if name.starts_with('/') {
         return name.to_string();
     }
@@ -239,8 +257,7 @@ struct Blocks<'a> {
     train: Option<(&'a ast::Body, Span)>,
 }
 
-fn resolve(trees: &[Tree], overrides: &[(ast::Name, ast::Dim)]) -> (Option<Design>, Vec<Diagnostic>) {
-    let mut resolver = Resolver::default();
+fn resolve(resolver: &mut Resolver, trees: &[Tree], overrides: &[(ast::Name, ast::Dim)]) -> Design {
     let blocks = resolver.collect(trees, overrides);
     let materials: Vec<Material> =
         blocks.materials.iter().map(|(name, body, _)| resolver.material(name, body)).collect();
@@ -255,16 +272,19 @@ fn resolve(trees: &[Tree], overrides: &[(ast::Name, ast::Dim)]) -> (Option<Desig
     }
     let measures = blocks.assembly.map_or(Vec::new(), |(_, body)| resolver.measures(body, &built));
     resolver.senses(&built.parts);
+    resolver.settle_readings();
     let stations = resolver.stations(&blocks, &catalogue);
     let inspect = resolver.inspect(blocks.inspect.map(|(_, body, span)| (body, span)), &built);
     let train = resolver.train(blocks.train);
     resolver.check_inspect_name(&blocks);
     resolver.unplaced(&blocks, &catalogue, &built);
     resolver.warn_unused(&blocks);
+    resolver.read_unread_names(false);
+    resolver.settle_readings();
     let name = blocks.assembly.map_or(String::new(), |(name, _)| name.text.clone());
     let (parts, components) = (built.parts, built.components);
-    let design = Design { name, dims: resolver.dims, materials, parts, components, measures, stations, inspect, train };
-    (Some(design), resolver.diagnostics)
+    let dims = std::mem::take(&mut resolver.dims);
+    Design { name, dims, materials, parts, components, measures, stations, inspect, train }
 }
 
 impl Resolver {
@@ -449,6 +469,8 @@ impl Resolver {
             }
         }
         scratch.senses(&parts);
+        scratch.settle_readings();
+        self.readings = scratch.readings;
         self.diagnostics = scratch.diagnostics;
         (self.used, self.used_materials) = (scratch.used, scratch.used_materials);
     }

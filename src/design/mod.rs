@@ -25,7 +25,9 @@ mod sense;
 mod shape;
 mod station;
 mod sum;
+mod survey;
 mod task;
 mod tolerance;
 
-pub use load::{Loaded, Read, load};
+pub use load::{Loaded, Read, load, path_beside};
+pub use survey::{Reading, Survey, survey};

@@ -33,6 +33,7 @@ impl Resolver {
         self.check_features(&format!("part `{}`", source.name.text), source.name.span, source.body);
         self.warn_unused_locals();
         self.warn_unused_outlines();
+        self.read_unread_names(true);
         let material = self.part_material(source, materials);
         Part { name: source.name.text.clone(), material, features, span: source.name.span }
     }

@@ -4,6 +4,7 @@
 
 use super::model::{DimId, Dimension, Expr, Sense};
 use super::outline::Drawn;
+use super::survey::Readings;
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::iso::General;
@@ -107,6 +108,8 @@ pub struct Resolver {
     /// Lines or features of all pieces so far, whichever are more.
     pub lines_in_all: u64,
     pub diagnostics: Vec<Diagnostic>,
+    /// What every number was taken for, if somebody asked for it.
+    pub readings: Option<Readings>,
     /// Names being evaluated, outermost first.
     chain: Vec<(String, Span)>,
 }
@@ -115,6 +118,11 @@ pub struct Resolver {
 pub type Span2 = (u32, u32, u32);
 
 impl Resolver {
+    /// One that keeps what it took every number for.
+    pub fn with_readings() -> Self {
+        Resolver { readings: Some(Readings::default()), ..Resolver::default() }
+    }
+
     pub fn title(&self, span: Span) -> Title {
         self.titles.get(span.file as usize).copied().unwrap_or_default()
     }
@@ -187,6 +195,12 @@ impl Resolver {
         if let Some(named) = table.get_mut(name) {
             named.busy = busy;
         }
+    }
+
+    /// Names of the part at hand, or of the file, whose limits nobody has asked for.
+    pub fn unread_names(&self, local: bool) -> Vec<String> {
+        let table = if local { &self.locals } else { &self.globals };
+        table.iter().filter(|(_, named)| named.shared.is_none()).map(|(name, _)| name.clone()).collect()
     }
 
     fn cyclic(&mut self, name: &str, defined: Span, used: Span, busy: bool) {

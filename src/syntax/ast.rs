@@ -252,6 +252,9 @@ pub struct Arg {
     pub before: Vec<String>,
     pub key: Name,
     pub value: Value,
+    /// Comment behind the argument, on its line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub after: Option<String>,
 }
 
 #[derive(Debug, Clone, Serialize)]

@@ -26,22 +26,27 @@ pub fn format(text: &str) -> Result<String, Vec<Diagnostic>> {
 }
 
 fn lines(out: &mut String, lines: &[Line], depth: usize) {
+    let widths = run_widths(lines);
     for (i, line) in lines.iter().enumerate() {
         gaps(out, &line.before, depth, i == 0);
         let after_block = i > 0 && depth == 0 && (body(&line.stmt).is_some() || body(&lines[i - 1].stmt).is_some());
         if after_block && line.before.is_empty() {
             out.push('\n');
         }
-        statement(out, line, depth, run_width(lines, i));
+        statement(out, line, depth, widths[i]);
     }
 }
 
 /// Blank lines collapse to one, and none stands at the edge of a block.
 fn gaps(out: &mut String, gaps: &[Gap], depth: usize, first: bool) {
-    for (i, gap) in gaps.iter().enumerate() {
+    let mut at_edge = first;
+    for gap in gaps {
         match gap {
-            Gap::Comment(text) => indented(out, depth, text),
-            Gap::Blank if (first && i == 0) || out.ends_with("\n\n") || out.ends_with("{\n") => {}
+            Gap::Comment(text) => {
+                indented(out, depth, text);
+                at_edge = false;
+            }
+            Gap::Blank if at_edge || out.ends_with("\n\n") => {}
             Gap::Blank => out.push('\n'),
         }
     }
@@ -75,16 +80,21 @@ fn indented(out: &mut String, depth: usize, text: &str) {
     out.push('\n');
 }
 
-/// The width to which the names before `=` are padded: that of the longest in the run of neighbouring lines.
-fn run_width(lines: &[Line], i: usize) -> usize {
-    let joins = |line: &Line| head(&line.stmt).is_some() && body(&line.stmt).is_none();
-    if !joins(&lines[i]) {
-        return 0;
+/// The width to which the names before `=` are padded, for every line: that of the longest in its run of neighbours.
+fn run_widths(lines: &[Line]) -> Vec<usize> {
+    let width = |line: &Line| head(&line.stmt).filter(|_| body(&line.stmt).is_none()).map(|head| head.chars().count());
+    let own: Vec<Option<usize>> = lines.iter().map(width).collect();
+    let mut widths = vec![0; lines.len()];
+    let mut start = 0;
+    while start < lines.len() {
+        let joins = |i: &usize| own[*i].is_some() && lines[*i].before.is_empty();
+        let end = if own[start].is_some() { (start + 1..lines.len()).find(|i| !joins(i)) } else { Some(start + 1) };
+        let end = end.unwrap_or(lines.len());
+        let longest = own[start..end].iter().flatten().copied().max().unwrap_or(0);
+        widths[start..end].fill(longest);
+        start = end;
     }
-    let continues = |line: &Line| joins(line) && line.before.is_empty();
-    let start = (0..=i).rev().find(|&k| k == 0 || !continues(&lines[k]) || !joins(&lines[k - 1])).unwrap_or(i);
-    let run = lines[start..].iter().enumerate().take_while(|(k, line)| *k == 0 || continues(line));
-    run.filter_map(|(_, line)| head(&line.stmt)).map(|head| head.chars().count()).max().unwrap_or(0)
+    widths
 }
 
 /// What stands before the `=`.
@@ -232,14 +242,15 @@ fn call(c: &Call, layout: Layout) -> String {
 
 fn args(list: &Args, layout: Layout) -> String {
     let arg = |a: &Arg| format!("{} = {}", a.key.text, value(&a.value));
-    let commented = !list.end.is_empty() || list.list.iter().any(|a| !a.before.is_empty());
+    let commented = !list.end.is_empty() || list.list.iter().any(|a| !a.before.is_empty() || a.after.is_some());
     if !commented && (layout == Layout::Flat || list.list.len() < 2) {
         return format!("({})", list.list.iter().map(arg).collect::<Vec<_>>().join(", "));
     }
     let mut text = "(\n".to_string();
     for a in &list.list {
         a.before.iter().for_each(|note| text += &format!("{INDENT}{note}\n"));
-        text += &format!("{INDENT}{},\n", arg(a));
+        let after = a.after.as_ref().map_or(String::new(), |note| format!("  {note}"));
+        text += &format!("{INDENT}{},{after}\n", arg(a));
     }
     list.end.iter().for_each(|note| text += &format!("{INDENT}{note}\n"));
     text + ")"

@@ -192,15 +192,23 @@ impl Builder {
 
     fn args(&self, pair: Node) -> Args {
         let span = self.span(&pair);
-        let (mut list, mut notes) = (Vec::new(), Vec::new());
+        let (mut list, mut notes): (Vec<Arg>, Vec<String>) = (Vec::new(), Vec::new());
+        let mut end = pair.as_span().start();
         for inner in pair.into_inner() {
+            let place = inner.as_span();
             if inner.as_rule() == Rule::note {
-                notes.push(inner.as_str().trim_end().to_string());
+                let note = inner.as_str().trim_end().to_string();
+                let same_line = !place.get_input()[end..place.start()].contains(['\n', '\r']);
+                match list.last_mut().filter(|arg| same_line && notes.is_empty() && arg.after.is_none()) {
+                    Some(arg) => arg.after = Some(note),
+                    None => notes.push(note),
+                }
                 continue;
             }
+            end = place.end();
             let inner = Children::of(inner);
             let (key, value) = (self.name(&inner.take(Rule::key)), self.value(inner.last()));
-            list.push(Arg { before: std::mem::take(&mut notes), key, value });
+            list.push(Arg { before: std::mem::take(&mut notes), key, value, after: None });
         }
         Args { list, end: notes, span }
     }

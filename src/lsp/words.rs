@@ -1,0 +1,496 @@
+//! The words of the language, each with a line of documentation: what hovers and completions say.
+//!
+//! Tests hold the keywords against the grammar, and the arguments and fields against what the compiler says it takes.
+
+/// What an argument or a field takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Takes {
+    /// mm unless the file says otherwise.
+    Length,
+    /// A length, or `through` in a cut.
+    Depth,
+    /// Degrees unless the file says otherwise.
+    Angle,
+    /// An angle, or `free`.
+    Turn,
+    Ratio,
+    Pixels,
+    /// A whole number.
+    Whole,
+    Point,
+    /// `640 x 480 px`
+    Image,
+    Material,
+    Outline,
+    OneOf(&'static [&'static str]),
+}
+
+impl Takes {
+    /// The unit, in words.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Takes::Length => "length, mm",
+            Takes::Depth => "length, mm, or `through`",
+            Takes::Angle => "angle, deg",
+            Takes::Turn => "angle, deg, or `free`",
+            Takes::Ratio => "ratio, or %",
+            Takes::Pixels => "px",
+            Takes::Whole => "whole number",
+            Takes::Point => "point `(x, y, z)`, mm",
+            Takes::Image => "`640 x 480 px`",
+            Takes::Material => "name of a material",
+            Takes::Outline => "name of an outline",
+            Takes::OneOf(_) => "one of the words",
+        }
+    }
+}
+
+/// An argument of a call, or a field of a block.
+#[derive(Debug, Clone, Copy)]
+pub struct Argument {
+    pub name: &'static str,
+    pub takes: Takes,
+    pub doc: &'static str,
+}
+
+/// What takes arguments or fields: a shape, a pattern, a light, a block.
+#[derive(Debug, Clone, Copy)]
+pub struct Owner {
+    pub name: &'static str,
+    pub role: Role,
+    pub doc: &'static str,
+    pub arguments: &'static [Argument],
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    Shape,
+    Pattern,
+    Light,
+    /// Fields in braces.
+    Block,
+    /// `watch pin (depth = 2)`
+    Options,
+}
+
+const fn arg(name: &'static str, takes: Takes, doc: &'static str) -> Argument {
+    Argument { name, takes, doc }
+}
+
+use Takes::{Angle, Depth, Image, Length, OneOf, Pixels, Point, Ratio, Turn, Whole};
+
+const BORE: Argument = arg("d", Length, "diameter");
+const HEIGHT: Argument = arg("h", Depth, "height, from z = 0 up");
+const DEEP: Argument = arg("h", Depth, "depth below the face z = 0");
+const POWER: Argument = arg("power", Ratio, "radiance beside the other lights, and its drift between photos; 1 ±10 %");
+const AIM: Argument = arg("aim", Point, "the point it is turned to; (0, 0, 0)");
+
+/// All that takes arguments or fields.
+pub const OWNERS: &[Owner] = &[
+    Owner {
+        name: "box",
+        role: Role::Shape,
+        doc: "a box, centred in x and y, that stands on z = 0",
+        arguments: &[
+            arg("x", Length, "size along x"),
+            arg("y", Length, "size along y"),
+            arg("z", Depth, "size along z, from z = 0 up"),
+        ],
+    },
+    Owner {
+        name: "cylinder",
+        role: Role::Shape,
+        doc: "a cylinder about z that stands on z = 0",
+        arguments: &[
+            BORE,
+            HEIGHT,
+            arg("chamfer", Length, "45 degree chamfer of both ends"),
+            arg("chamfer_top", Length, "45 degree chamfer of the upper end"),
+            arg("chamfer_bottom", Length, "45 degree chamfer of the lower end"),
+        ],
+    },
+    Owner { name: "cone", role: Role::Shape, doc: "a cone or frustum about z that stands on z = 0", arguments: CONE },
+    Owner { name: "frustum", role: Role::Shape, doc: "a frustum about z that stands on z = 0", arguments: CONE },
+    Owner { name: "sphere", role: Role::Shape, doc: "a sphere, centred on the origin", arguments: &[BORE] },
+    Owner {
+        name: "torus",
+        role: Role::Shape,
+        doc: "a ring about z, centred on the origin",
+        arguments: &[
+            arg("d", Length, "diameter of the circle that the tube follows"),
+            arg("tube", Length, "diameter of the tube"),
+        ],
+    },
+    Owner {
+        name: "prism",
+        role: Role::Shape,
+        doc: "an outline in x and y, extruded from z = 0 up",
+        arguments: &[arg("outline", Takes::Outline, "the outline, drawn in this part"), HEIGHT],
+    },
+    Owner {
+        name: "revolve",
+        role: Role::Shape,
+        doc: "an outline in x (the distance from the axis) and z, turned about z",
+        arguments: &[arg("outline", Takes::Outline, "the outline, drawn in this part")],
+    },
+    Owner {
+        name: "hole",
+        role: Role::Shape,
+        doc: "a drilled hole: goes down from the face z = 0; faces `bore.side`, `bore.bottom`, `point.side`",
+        arguments: &[BORE, DEEP, arg("tip", Angle, "angle of the drill's point below that depth")],
+    },
+    Owner {
+        name: "counterbore",
+        role: Role::Shape,
+        doc: "a hole with a flat seat for a head: goes down from the face z = 0",
+        arguments: &[
+            BORE,
+            DEEP,
+            arg("head_d", Length, "diameter of the seat"),
+            arg("head_h", Length, "depth of the seat below the face"),
+        ],
+    },
+    Owner {
+        name: "countersink",
+        role: Role::Shape,
+        doc: "a hole with a conical seat for a head: goes down from the face z = 0",
+        arguments: &[
+            BORE,
+            DEEP,
+            arg("head_d", Length, "diameter of the cone in the face"),
+            arg("angle", Angle, "angle of the cone; 90 deg"),
+        ],
+    },
+    Owner {
+        name: "circle",
+        role: Role::Pattern,
+        doc: "copies on a circle, counter-clockwise about +z, each turned with its place",
+        arguments: &[
+            arg("d", Length, "diameter of the circle"),
+            arg("r", Length, "radius of the circle, instead of `d`"),
+            arg("from", Angle, "where the first copy stands, from +x; 0"),
+            arg("step", Angle, "from copy to copy; a whole turn divided by the count"),
+        ],
+    },
+    Owner {
+        name: "line",
+        role: Role::Pattern,
+        doc: "copies on a line, from the feature's place on",
+        arguments: &[
+            arg("pitch", Length, "from copy to copy"),
+            arg("angle", Angle, "direction of the line, from +x; 0"),
+        ],
+    },
+    Owner {
+        name: "grid",
+        role: Role::Pattern,
+        doc: "copies on a grid centred on the feature's place, in reading order",
+        arguments: &[
+            arg("columns", Whole, "copies in a row"),
+            arg("x", Length, "from column to column"),
+            arg("y", Length, "from row to row"),
+        ],
+    },
+    Owner {
+        name: "ring",
+        role: Role::Light,
+        doc: "a ring light round the lens",
+        arguments: &[
+            arg("inner", Length, "inner radius; 30 mm"),
+            arg("outer", Length, "outer radius; inner + 20 mm"),
+            arg("setback", Length, "distance behind the front of the lens; 0"),
+            POWER,
+        ],
+    },
+    Owner { name: "panel", role: Role::Light, doc: "a flat panel", arguments: PANEL },
+    Owner { name: "bar", role: Role::Light, doc: "a bar light", arguments: PANEL },
+    Owner {
+        name: "room",
+        role: Role::Light,
+        doc: "light from the whole upper hemisphere",
+        arguments: &[arg("patches", Whole, "patches of equal solid angle, each with a power of its own; 9"), POWER],
+    },
+    Owner {
+        name: "material",
+        role: Role::Block,
+        doc: "how a surface answers light; ranges are drawn for every piece and image",
+        arguments: &[
+            arg("kind", OneOf(&["metal", "plastic", "matt"]), "metal, plastic (under a clear coat) or matt; matt"),
+            arg("metal", OneOf(&["steel", "aluminium", "brass", "copper"]), "sets `n` and `k`; steel"),
+            arg("n", Ratio, "refractive index, real part; of the metal"),
+            arg("k", Ratio, "refractive index, imaginary part; of the metal"),
+            arg(
+                "reflectance",
+                Ratio,
+                "factor on a metal's reflection, albedo of the others; 0.4 .. 0.7, or 0.1 .. 0.4",
+            ),
+            arg("roughness", Ratio, "GGX alpha; metal 0.06 .. 0.3, plastic 0.1 .. 0.3"),
+            arg("edge_break", Length, "width of the rounding of convex edges; 0.05 .. 0.2 mm"),
+            arg("mottle", Ratio, "relative amplitude of blotches and grain; 0"),
+            arg("mottle_size", Length, "size of the blotches, or `(x, y, z)` for grain; 8 mm"),
+        ],
+    },
+    Owner {
+        name: "part",
+        role: Role::Block,
+        doc: "a part: its material and its features, from top to bottom",
+        arguments: &[arg("material", Takes::Material, "what the part is made of")],
+    },
+    Owner {
+        name: "place",
+        role: Role::Block,
+        doc: "puts pieces of a part on a component or on one of its features",
+        arguments: &[
+            arg("x", Length, "place along x of the support's frame; 0"),
+            arg("y", Length, "place along y of the support's frame; 0"),
+            arg("z", Length, "place along z of the support's frame; 0"),
+            arg("rx", Turn, "turn about x, first; 0"),
+            arg("ry", Turn, "turn about y, second; 0"),
+            arg("rz", Turn, "turn about z, last; 0"),
+        ],
+    },
+    Owner {
+        name: "camera",
+        role: Role::Block,
+        doc: "the camera: `fixed`, or `auto` within ranges among which the compiler chooses",
+        arguments: &[
+            arg("image", Image, "size of the image; 640 x 480 px"),
+            arg("focal", Length, "focal length; 16 mm ±0.5 %"),
+            arg("pitch", Length, "distance of two pixels on the sensor; 0.0074 mm"),
+            arg("aim", Point, "the point looked at, in the assembly's frame; (0, 0, 0)"),
+            arg("distance", Length, "from there to the camera; 300 mm"),
+            arg("elevation", Angle, "above the horizon; 90 deg"),
+            arg("azimuth", Angle, "where the camera stands, from +x towards +y; -90 deg"),
+            arg("k1", Ratio, "radial distortion, radius in half image widths; 0"),
+            arg("offset", Length, "error of the installation in each axis; 0 ±1 mm"),
+            arg("tilt", Angle, "error of the installation about each axis; 0 ±0.3 deg"),
+            arg("blur", Pixels, "standard deviation of the point spread; 0.3 .. 0.8 px"),
+            arg("response", OneOf(&["linear", "srgb"]), "of the sensor to light; linear"),
+        ],
+    },
+    Owner {
+        name: "floor",
+        role: Role::Block,
+        doc: "the endless plane that the assembly stands on",
+        arguments: &[
+            arg("z", Length, "height in the assembly's frame; 0"),
+            arg("material", Takes::Material, "of the floor"),
+        ],
+    },
+    Owner {
+        name: "vary",
+        role: Role::Block,
+        doc: "what varies from photo to photo",
+        arguments: &[
+            arg("x", Length, "place of the assembly; 0"),
+            arg("y", Length, "place of the assembly; 0"),
+            arg("z", Length, "place of the assembly; 0"),
+            arg("rz", Angle, "turn of the assembly about z; 0"),
+            arg("exposure", Ratio, "beside the nominal one; 1 ±5 %"),
+            arg("noise", Ratio, "standard deviation of the sensor's noise, share of full scale; 0.5 %"),
+        ],
+    },
+    Owner {
+        name: "inspect",
+        role: Role::Block,
+        doc: "what the inspector answers for",
+        arguments: &[arg("false_reject", Ratio, "share of good assemblies that may be rejected; 0.1 %")],
+    },
+    Owner {
+        name: "train",
+        role: Role::Block,
+        doc: "how hard to train",
+        arguments: &[
+            arg("images", Whole, "draws of the assembly per scene; 14"),
+            arg("seed", Whole, "of all random draws; 1"),
+            arg("levels", Whole, "resolutions per node, each half as fine as the one before; 4"),
+            arg("samples", Whole, "per pixel; 16"),
+            arg("draw", OneOf(&["uniform", "nominal"]), "between the limits, or with the mode at nominal; uniform"),
+        ],
+    },
+    Owner {
+        name: "watch",
+        role: Role::Options,
+        doc: "watches a component, with so many levels of its error tree",
+        arguments: &[arg("depth", Whole, "levels of the error tree; visibility decides")],
+    },
+];
+
+const CONE: &[Argument] = &[
+    arg("d1", Length, "diameter at z = 0; 0 makes a point"),
+    arg("d2", Length, "diameter at z = h; 0 makes a point"),
+    arg("h", Length, "height, from z = 0 up"),
+];
+
+const PANEL: &[Argument] = &[
+    arg("width", Length, "across, horizontal"),
+    arg("height", Length, "upright"),
+    arg("at", Point, "its centre, in the assembly's frame"),
+    AIM,
+    POWER,
+];
+
+/// Where a word may stand: the name of the block, `file` outside all, or what it follows.
+pub struct Keyword {
+    pub word: &'static str,
+    pub within: &'static str,
+    pub doc: &'static str,
+    /// What completion writes, in the snippets of the protocol; the word alone if empty.
+    pub snippet: &'static str,
+}
+
+const fn word(within: &'static str, word: &'static str, snippet: &'static str, doc: &'static str) -> Keyword {
+    Keyword { word, within, doc, snippet }
+}
+
+/// The words of the language that are no names. A word with two meanings has two entries.
+pub const KEYWORDS: &[Keyword] = &[
+    word("file", "gonogo", "gonogo 1", "the version of the language; the first statement of every file"),
+    word("file", "units", "units mm deg", "units of numbers without one: length, then angle"),
+    word(
+        "file",
+        "tolerances",
+        "tolerances ${1:ISO2768-m}",
+        "general tolerance of sizes without their own: ISO 2768-1 class, or `exact`",
+    ),
+    word("file", "use", "use \"$1\"", "brings another file's blocks and named dimensions into this spec"),
+    word(
+        "file",
+        "let",
+        "let ${1:name} = $0",
+        "a named dimension: drawn once for each assembly, the same wherever its name stands; mm unless it has a unit",
+    ),
+    word("file", "material", "material ${1:name} {\n    kind = ${2:matt}$0\n}", "how a surface answers light"),
+    word(
+        "file",
+        "part",
+        "part ${1:name} {\n    material = $2\n\n    add ${3:body} = $0\n}",
+        "a part: its material and its features, from top to bottom",
+    ),
+    word("file", "assembly", "assembly ${1:name} {\n    root $0\n}", "which part is the root, and what stands on it"),
+    word(
+        "file",
+        "station",
+        "station ${1:bench} {\n    camera fixed {\n        $0\n    }\n\n    light room = room(patches = 9)\n}",
+        "camera, lights, floor, and what varies from photo to photo",
+    ),
+    word("file", "inspect", "inspect {\n    $0\n}", "what the inspector answers for"),
+    word("file", "train", "train {\n    images = 14$0\n}", "how hard to train"),
+    word("part", "let", "let ${1:name} = $0", "a named dimension of each piece of this part; mm unless it has a unit"),
+    word("part", "add", "add ${1:name} = $0", "adds a shape to what stands above"),
+    word("part", "cut", "cut ${1:name} = $0", "cuts a shape from what stands above"),
+    word("part", "keep", "keep ${1:name} = $0", "keeps only what lies inside a shape"),
+    word(
+        "part",
+        "outline",
+        "outline ${1:name} {\n    from (0, 0)\n    $0\n}",
+        "an outline, drawn from corner to corner, for `prism` and `revolve`",
+    ),
+    word(
+        "feature",
+        "group",
+        "group {\n    add ${1:name} = $0\n}",
+        "features of their own, added, cut or kept as a whole",
+    ),
+    word("feature", "at", "at (${1:0}, ${2:0}, ${3:0})", "moves the feature: `at (x, y, z)`, mm"),
+    word(
+        "feature",
+        "turn",
+        "turn (${1:0}, ${2:0}, ${3:0})",
+        "turns the feature about its own axes, x first: `turn (rx, ry, rz)`, deg",
+    ),
+    word("feature", "on", "on $0", "the pattern of the copies, or what a component is placed on"),
+    word("outline", "from", "from (${1:0}, ${2:0})", "where the outline begins, mm"),
+    word("outline", "line", "line to (${1:0}, ${2:0})", "a straight side to a corner, mm"),
+    word(
+        "outline",
+        "arc",
+        "arc to (${1:0}, ${2:0}) radius ${3:10} ${4|left,right|}",
+        "an arc to a corner: `arc to (x, y) radius r left`",
+    ),
+    word("side", "to", "", "the corner a side leads to, or the second face of a measure"),
+    word("side", "radius", "", "of the arc, mm"),
+    word("side", "left", "", "the arc runs counter-clockwise"),
+    word("side", "right", "", "the arc runs clockwise"),
+    word("side", "long", "", "the arc is more than half a turn"),
+    word("side", "round", "", "rounds the corner with this radius, mm"),
+    word("side", "chamfer", "", "cuts the corner off at this distance on both sides, mm"),
+    word("assembly", "root", "root $0", "the part that the others stand on"),
+    word(
+        "assembly",
+        "place",
+        "place ${1:name} on $0",
+        "puts pieces of a part on a component or on one of its features",
+    ),
+    word(
+        "assembly",
+        "measure",
+        "measure ${1:name} = from $2 to $0",
+        "the distance of two faces, mm, and behind `within` the limits it has to keep",
+    ),
+    word("measure", "from", "", "the first face of a measure"),
+    word("measure", "within", "", "the limits that a measure has to keep, mm"),
+    word(
+        "station",
+        "camera",
+        "camera ${1|fixed,auto|} {\n    $0\n}",
+        "the camera: as installed, or as the compiler may choose it",
+    ),
+    word("station", "light", "light ${1:name} = $0", "a lamp, or the light of the room"),
+    word("station", "floor", "floor {\n    material = $0\n}", "the endless plane that the assembly stands on"),
+    word("station", "vary", "vary {\n    $0\n}", "what varies from photo to photo"),
+    word("camera", "fixed", "", "the camera stands where the spec says"),
+    word("camera", "auto", "", "the compiler chooses the camera's place within ranges"),
+    word("inspect", "watch", "watch $0", "watches a component; without any, all but the root are watched"),
+    word("inspect", "ignore", "ignore $0", "takes a component out"),
+    word("dimension", "basic", "", "exactly this, whatever the general tolerance"),
+    word("dimension", "each", "", "every copy of the pattern has its own"),
+    word("dimension", "mmc", "", "the size at maximum material condition"),
+    word("dimension", "nominal", "", "the size aimed at"),
+    word("dimension", "lmc", "", "the size at least material condition"),
+    word("dimension", "through", "", "beyond the part at both ends; in cuts only"),
+    word("dimension", "free", "", "any turn: drawn over a whole turn"),
+];
+
+/// Units, with what they measure.
+pub const UNITS: &[(&str, &str)] = &[
+    ("mm", "millimetres"),
+    ("um", "micrometres, 0.001 mm"),
+    ("cm", "centimetres, 10 mm"),
+    ("m", "metres, 1000 mm"),
+    ("in", "inches, 25.4 mm"),
+    ("deg", "degrees"),
+    ("rad", "radians"),
+    ("px", "pixels"),
+    ("%", "a share: hundredths"),
+];
+
+/// General tolerances of the title block.
+pub const GENERAL: &[(&str, &str)] = &[
+    ("ISO2768-f", "ISO 2768-1 fine: ±0.1 mm at 10 mm"),
+    ("ISO2768-m", "ISO 2768-1 medium: ±0.2 mm at 10 mm"),
+    ("ISO2768-c", "ISO 2768-1 coarse: ±0.5 mm at 10 mm"),
+    ("ISO2768-v", "ISO 2768-1 very coarse: ±1 mm at 10 mm"),
+    ("exact", "sizes without a tolerance are exact"),
+];
+
+/// Fits that workshops keep tools for, the usual ones first.
+pub const HOLES: &[&str] = &["H7", "H8", "H6", "H9", "H11", "F7", "G7", "G6", "K7", "N7", "P7", "JS7", "E9", "D10"];
+pub const SHAFTS: &[&str] = &["h6", "g6", "f7", "h7", "k6", "m6", "n6", "p6", "js6", "h9", "h11", "e8", "d9"];
+
+/// What takes arguments under that name in that role.
+pub fn owner(name: &str, roles: &[Role]) -> Option<&'static Owner> {
+    OWNERS.iter().find(|o| o.name == name && roles.contains(&o.role))
+}
+
+impl Owner {
+    pub fn argument(&self, name: &str) -> Option<&'static Argument> {
+        self.arguments.iter().find(|a| a.name == name)
+    }
+
+    /// `cylinder(d, h, chamfer)`
+    pub fn signature(&self) -> String {
+        let names: Vec<&str> = self.arguments.iter().map(|a| a.name).collect();
+        format!("{}({})", self.name, names.join(", "))
+    }
+}
