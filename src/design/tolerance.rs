@@ -138,7 +138,7 @@ impl Resolver {
                 Diagnostic::error("E0302", class.span, format!("no ISO 286 class `{}`", class.text))
                     .label("unknown class")
                     .help("a class is a letter and a grade, such as `H7` for a hole or `g6` for a shaft")
-                    .note("known: d e f g h js k m n p and D to P, grades 4 to 12")
+                    .note("known: d e f g h js k m n p and D to P, grades 4 to 17")
             }
             FitError::OutsideTable => {
                 let message = format!("fits cover sizes over 0 up to {} mm, this is {nominal} mm", iso::LARGEST);

@@ -20,6 +20,7 @@ const PAGES: &[(&str, &str)] = &[
     ("E0211", include_str!("explain/E0211.md")),
     ("E0212", include_str!("explain/E0212.md")),
     ("E0213", include_str!("explain/E0213.md")),
+    ("E0214", include_str!("explain/E0214.md")),
     ("E0301", include_str!("explain/E0301.md")),
     ("E0302", include_str!("explain/E0302.md")),
     ("E0303", include_str!("explain/E0303.md")),

@@ -9,6 +9,7 @@ mod faults;
 mod format;
 mod parse;
 mod scan;
+mod table;
 
 pub use format::format;
 pub use parse::parse;
