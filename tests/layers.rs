@@ -30,6 +30,7 @@ const HOUSE: &[(&str, &[&str])] = &[
         &["train", "view", "scene", "exchange", "drawing", "assembly", "solid", "design", "runtime", "diag", "units"],
     ),
     ("golden", &[]),
+    ("import", &["syntax", "diag"]),
     (
         "artifacts",
         &[

@@ -8,6 +8,7 @@ mod demo;
 mod font;
 mod format;
 mod golden;
+mod import;
 mod judge;
 mod messages;
 mod output;
@@ -63,6 +64,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Explain(args) => explain(args),
         Command::Golden(Golden::Check(args)) => golden::check(args, global),
         Command::Golden(Golden::Bless(args)) => golden::bless(args, global),
+        Command::Import(args) => import::import(args, global),
         Command::Demo(args) => demo::demo(args, global),
     }
 }

@@ -198,9 +198,11 @@ impl Resolver {
         let sizes: Vec<&str> = table.rows.iter().map(|(key, _)| key.text.as_str()).collect();
         let diagnostic = Diagnostic::error("E0214", span, message).label("not in its table");
         self.report(match near {
-            Some(near) => diagnostic
-                .help(format!("did you mean `{}`?", near.text))
-                .note(format!("`{}` is one of {}", table.name.text, sizes.join(", "))),
+            Some(near) => diagnostic.help(format!("did you mean `{}`?", near.text)).note(format!(
+                "`{}` is one of {}",
+                table.name.text,
+                sizes.join(", ")
+            )),
             None => diagnostic,
         });
     }

@@ -262,7 +262,8 @@ struct Blocks<'a> {
 fn resolve(trees: &[Tree], overrides: &[(ast::Name, ast::Dim)]) -> (Option<Design>, Vec<Diagnostic>) {
     let mut resolver = Resolver::default();
     let mut blocks = resolver.collect(trees, overrides);
-    let families: BTreeMap<&str, Family> = blocks.families.iter().rev().map(|(f, _)| (f.name.text.as_str(), *f)).collect();
+    let families: BTreeMap<&str, Family> =
+        blocks.families.iter().rev().map(|(f, _)| (f.name.text.as_str(), *f)).collect();
     for (name, call, used) in std::mem::take(&mut blocks.members) {
         blocks.parts.push((resolver.member(name, call, &families), used));
     }

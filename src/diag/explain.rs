@@ -59,6 +59,9 @@ const PAGES: &[(&str, &str)] = &[
     ("E0806", include_str!("explain/E0806.md")),
     ("E0807", include_str!("explain/E0807.md")),
     ("E0808", include_str!("explain/E0808.md")),
+    ("E0901", include_str!("explain/E0901.md")),
+    ("E0902", include_str!("explain/E0902.md")),
+    ("E0903", include_str!("explain/E0903.md")),
 ];
 
 /// The page of a code such as `E0305`; `None` for a code that does not exist.
