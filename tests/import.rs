@@ -177,6 +177,14 @@ fn booleans_of_booleans_become_groups() {
 }
 
 #[test]
+fn bodies_that_stand_apart_are_parts_of_their_own() {
+    let three: String = [0.0, 20.0, 3.0].map(|x| moved([x, 0.0, 0.0], &cylinder(4.0, 5.0))).concat();
+    let part = imported(&three);
+    assert!(part.contains("part x_1 {") && part.contains("part x_2 {") && !part.contains("part x_3"), "{part}");
+    assert!(part.contains("2x cylinder(d = 4, h = 5) on line(pitch = 3)"), "{part}");
+}
+
+#[test]
 fn what_has_no_counterpart_is_named_with_its_place() {
     let csg = "cube(size = 2, center = true);\nhull() {\ncube(size = 1);\nsphere(r = 1);\n}\ntext(text = \"a \\\"b\\\"\");\npolyhedron(points = [], faces = []);\n";
     let found = faults(csg);

@@ -8,6 +8,8 @@ use crate::diag::{Diagnostic, Span};
 const MAX_TEXT: usize = 1 << 24;
 /// Nodes nested deeper than this are refused, which bounds all recursion over them.
 const MAX_DEPTH: usize = 128;
+/// More nodes than this are no part: what follows compares each with each.
+const MAX_NODES: usize = 20_000;
 
 /// `cylinder($fn = 0, h = 3, …) { … }`
 #[derive(Debug, Clone)]
@@ -73,7 +75,7 @@ pub fn parse(text: &str) -> Result<Vec<Node>, Vec<Diagnostic>> {
         let message = format!("this file has {} bytes, the limit is {MAX_TEXT}", text.len());
         return Err(vec![Diagnostic::error("E0901", Span::default(), message)]);
     }
-    let mut reader = Reader { text, at: 0 };
+    let mut reader = Reader { text, at: 0, count: 0 };
     let nodes = reader.nodes(0).map_err(|fault| vec![*fault])?;
     match reader.rest() {
         "" => Ok(nodes),
@@ -86,6 +88,8 @@ type Read<T> = Result<T, Box<Diagnostic>>;
 struct Reader<'t> {
     text: &'t str,
     at: usize,
+    /// Nodes so far.
+    count: usize,
 }
 
 impl<'t> Reader<'t> {
@@ -166,6 +170,11 @@ impl<'t> Reader<'t> {
         if depth > MAX_DEPTH {
             let message = format!("nodes are nested more than {MAX_DEPTH} deep");
             return Err(Box::new(Diagnostic::error("E0901", span, message).label("too deep here")));
+        }
+        self.count += 1;
+        if self.count > MAX_NODES {
+            let message = format!("this design has more than {MAX_NODES} nodes");
+            return Err(Box::new(Diagnostic::error("E0901", span, message).label("one too many")));
         }
         self.need('(')?;
         let args = self.args()?;

@@ -66,7 +66,7 @@ fn mark(steps: &mut [Step], solid: &mut usize, touching: &BTreeSet<(usize, &'sta
         match &mut step.item {
             Item::Group(inner) => mark(inner, solid, touching),
             Item::Solid { .. } => {
-                step.exact = touching.iter().filter(|(of, _)| of == solid).map(|(_, size)| *size).collect();
+                step.exact = touching.range((*solid, "")..(*solid + 1, "")).map(|(_, size)| *size).collect();
                 *solid += 1;
             }
         }

@@ -8,12 +8,18 @@ use super::csg::{Node, Value};
 use super::feature::{Item, Op, Outline, Shape, Step};
 use super::flat;
 use super::placement::{Matrix, Parts};
+use super::write::extent;
 use crate::diag::{Diagnostic, Span};
 
 /// With this many facets or fewer, asked for by `$fn`, a round shape is meant as a prism: a hexagon, an octagon.
 pub const FACETED: f64 = 12.0;
 /// More nodes than this without a counterpart need not be listed.
 const MAX_FAULTS: usize = 50;
+/// Least and greatest coordinates.
+type Extent = [[f64; 3]; 2];
+
+/// Boxes nearer than this touch (mm).
+const TOUCH: f64 = 1e-3;
 /// Groups in groups that the language's parser takes.
 const MAX_GROUPS: usize = 24;
 /// Factors that differ by more than this in two directions make an ellipse of a circle: OpenSCAD prints six digits.
@@ -36,20 +42,57 @@ pub struct Frame {
     pub drawing: Drawing,
 }
 
-/// The feature list of a design, or why there is none.
-pub fn part(nodes: &[Node]) -> Result<Vec<Step>, Vec<Diagnostic>> {
+/// A feature list for each body of a design that stands apart from the others, or why there is none.
+pub fn parts(nodes: &[Node]) -> Result<Vec<Vec<Step>>, Vec<Diagnostic>> {
     let mut lower = Lower { faults: Vec::new() };
     let frame = Frame { outer: Matrix::IDENTITY, inner: Matrix::IDENTITY, drawing: Drawing::None };
-    let steps = lower.union(nodes, &frame);
-    if lower.faults.is_empty() && steps.is_empty() {
+    let mut bodies = lower.pieces(nodes, &frame);
+    bodies.retain(|body| !body.is_empty());
+    let parts: Vec<Vec<Step>> = apart(bodies).into_iter().map(sum).collect();
+    if lower.faults.is_empty() && parts.is_empty() {
         let message = "this design is empty".to_string();
         lower.faults.push(Diagnostic::error("E0903", Span::default(), message).label("nothing is made here"));
     }
-    if lower.faults.is_empty() && depth(&steps) > MAX_GROUPS {
+    if lower.faults.is_empty() && parts.iter().any(|steps| depth(steps) > MAX_GROUPS) {
         let message = format!("booleans are nested more than {MAX_GROUPS} deep");
         lower.faults.push(Diagnostic::error("E0902", Span::default(), message).label("too deep for one part"));
     }
-    if lower.faults.is_empty() { Ok(steps) } else { Err(lower.faults) }
+    if lower.faults.is_empty() { Ok(parts) } else { Err(lower.faults) }
+}
+
+/// Bodies whose boxes meet, together; in the order of the first of each.
+fn apart(bodies: Vec<Vec<Step>>) -> Vec<Vec<Vec<Step>>> {
+    let mut found: Vec<(Extent, Vec<Vec<Step>>)> = Vec::new();
+    for body in bodies {
+        let (mut reach, mut together) = (extent(&body), Vec::new());
+        // A body may join several that were apart, and their common box still more.
+        while let Some(i) = found.iter().position(|(other, _)| meet(&reach, other)) {
+            let (other, earlier) = found.remove(i);
+            reach = [0, 1].map(|end| {
+                [0, 1, 2].map(|k| if end == 0 { reach[0][k].min(other[0][k]) } else { reach[1][k].max(other[1][k]) })
+            });
+            together.splice(0..0, earlier);
+        }
+        together.push(body);
+        found.push((reach, together));
+    }
+    found.into_iter().map(|(_, bodies)| bodies).collect()
+}
+
+fn meet(a: &Extent, b: &Extent) -> bool {
+    (0..3).all(|k| a[0][k] <= b[1][k] + TOUCH && b[0][k] <= a[1][k] + TOUCH)
+}
+
+/// One feature list of all bodies.
+fn sum(mut bodies: Vec<Vec<Step>>) -> Vec<Step> {
+    bodies.retain(|body| !body.is_empty());
+    // One body that is more than a sum may stand first, without a group.
+    if let Some(first) = bodies.iter().position(|body| !is_sum(body)) {
+        bodies[..=first].rotate_right(1);
+    }
+    let mut steps = Vec::new();
+    bodies.into_iter().for_each(|body| append(&mut steps, Op::Add, body));
+    steps
 }
 
 fn depth(steps: &[Step]) -> usize {
@@ -109,15 +152,23 @@ impl Lower {
     }
 
     pub fn union(&mut self, nodes: &[Node], frame: &Frame) -> Vec<Step> {
-        let mut bodies = self.bodies(nodes, frame);
-        bodies.retain(|body| !body.is_empty());
-        // One body that is more than a sum may stand first, without a group.
-        if let Some(first) = bodies.iter().position(|body| !is_sum(body)) {
-            bodies[..=first].rotate_right(1);
+        sum(self.bodies(nodes, frame))
+    }
+
+    /// What a union unites, through all unions in it.
+    fn pieces(&mut self, nodes: &[Node], frame: &Frame) -> Vec<Vec<Step>> {
+        let mut found = Vec::new();
+        for node in nodes.iter().filter(|node| !node.background) {
+            match node.name.as_str() {
+                "group" | "union" | "color" | "render" => found.extend(self.pieces(&node.children, frame)),
+                "multmatrix" => match matrix(node) {
+                    Some(matrix) => found.extend(self.pieces(&node.children, &frame.then(&matrix))),
+                    None => found.push(self.refuse(node, NO_MATRIX)),
+                },
+                _ => found.push(self.node(node, frame)),
+            }
         }
-        let mut steps = Vec::new();
-        bodies.into_iter().for_each(|body| append(&mut steps, Op::Add, body));
-        steps
+        found
     }
 
     fn difference(&mut self, nodes: &[Node], frame: &Frame) -> Vec<Step> {
@@ -141,19 +192,10 @@ impl Lower {
     }
 
     fn moved(&mut self, node: &Node, frame: &Frame) -> Vec<Step> {
-        let rows: Option<Vec<Vec<f64>>> =
-            node.get("").and_then(Value::list).and_then(|rows| rows.iter().map(Value::numbers).collect());
-        let matrix = match rows.as_deref() {
-            Some([x, y, z, ..]) if [x, y, z].iter().all(|row| row.len() == 4 && row.iter().all(|v| v.is_finite())) => {
-                Matrix([x, y, z].map(|row| [row[0], row[1], row[2], row[3]]))
-            }
-            _ => return self.refuse(node, "no matrix of four by four numbers"),
-        };
-        let frame = match frame.drawing {
-            Drawing::None => Frame { outer: frame.outer.then(&matrix), ..*frame },
-            _ => Frame { inner: frame.inner.then(&matrix), ..*frame },
-        };
-        self.union(&node.children, &frame)
+        match matrix(node) {
+            Some(matrix) => self.union(&node.children, &frame.then(&matrix)),
+            None => self.refuse(node, NO_MATRIX),
+        }
     }
 
     fn extruded(&mut self, node: &Node, frame: &Frame) -> Vec<Step> {
@@ -291,6 +333,24 @@ impl Lower {
     }
 }
 
+impl Frame {
+    fn then(&self, matrix: &Matrix) -> Frame {
+        match self.drawing {
+            Drawing::None => Frame { outer: self.outer.then(matrix), ..*self },
+            _ => Frame { inner: self.inner.then(matrix), ..*self },
+        }
+    }
+}
+
+/// The matrix of a `multmatrix`.
+fn matrix(node: &Node) -> Option<Matrix> {
+    let rows: Vec<Vec<f64>> = node.get("")?.list()?.iter().map(Value::numbers).collect::<Option<_>>()?;
+    let [x, y, z, ..] = rows.as_slice() else { return None };
+    let good = [x, y, z].iter().all(|row| row.len() == 4 && row.iter().all(|v| v.is_finite()));
+    good.then(|| Matrix([x, y, z].map(|row| [row[0], row[1], row[2], row[3]])))
+}
+
+const NO_MATRIX: &str = "no matrix of four by four numbers";
 const SHEARED: &str = "sheared by its `multmatrix`";
 const ELLIPSE: &str = "scaled to an ellipse";
 
@@ -311,7 +371,7 @@ fn append(steps: &mut Vec<Step>, op: Op, body: Vec<Step>) {
 
 /// Whether a round shape asks for so few facets that it is a prism.
 pub fn is_faceted(node: &Node) -> bool {
-    node.number("$fn").is_some_and(|n| n >= 1.0 && n <= FACETED)
+    node.number("$fn").is_some_and(|n| (1.0..=FACETED).contains(&n))
 }
 
 pub fn is_even(a: f64, b: f64) -> bool {

@@ -16,9 +16,11 @@ mod write;
 
 use crate::diag::Diagnostic;
 
-/// The part that `text`, the text of a `.csg` file called `file`, draws; `name` is what it is to be called.
+/// The part that `text`, the text of a `.csg` file called `file`, draws; `name` is what it is to be called. Bodies that stand
+/// apart become a part each: `name_1`, `name_2`.
 pub fn openscad(text: &str, file: &str, name: &str) -> Result<String, Vec<Diagnostic>> {
     let nodes = csg::parse(text)?;
-    let steps = lower::part(&nodes)?;
-    write::part(&flush::marked(pattern::folded(steps)), file, name)
+    let parts = lower::parts(&nodes)?;
+    let parts: Vec<_> = parts.into_iter().map(|steps| flush::marked(pattern::folded(steps))).collect();
+    write::parts(&parts, file, name)
 }

@@ -15,11 +15,10 @@ const GENERAL: std::ops::Range<f64> = 0.5..4000.0;
 /// A cut whose ends are no farther inside than this goes through (mm).
 const THROUGH: f64 = 1e-6;
 
-/// The text of the part called `name`, drawn in `file`.
-pub fn part(steps: &[Step], file: &str, name: &str) -> Result<String, Vec<Diagnostic>> {
-    let mut writer = Writer { outlines: Vec::new(), extent: extent(steps), names: Vec::new() };
-    let features = writer.features(steps, true, 1);
-    let outlines: String = writer.outlines.iter().enumerate().map(|(i, o)| outline(i + 1, o)).collect();
+/// The text of the part called `name`, drawn in `file`; of several they have numbers.
+pub fn parts(parts: &[Vec<Step>], file: &str, name: &str) -> Result<String, Vec<Diagnostic>> {
+    let own = |i: usize| if parts.len() == 1 { name.to_string() } else { format!("{name}_{}", i + 1) };
+    let parts: String = parts.iter().enumerate().map(|(i, steps)| part(steps, &own(i), name)).collect();
     let file = file.replace(['\n', '\r'], " ");
     let text = format!(
         "gonogo 1\n\nunits mm deg\ntolerances ISO2768-m\n\n\
@@ -27,7 +26,7 @@ pub fn part(steps: &[Step], file: &str, name: &str) -> Result<String, Vec<Diagno
          // give what matters a tolerance of its own. A size is `basic` where a face of another feature lies on its own: name it\n\
          // with `let`, and use that name in both. Round shapes are round; those of {FACETED} facets ($fn) or fewer are prisms.\n\n\
          material {name}_surface {{\nkind = matt\n}}\n\n\
-         part {name} {{\nmaterial = {name}_surface\n\n{outlines}{features}}}\n"
+         {parts}"
     );
     crate::syntax::format(&text).map_err(|faults| {
         let why = faults.first().map_or(String::new(), |fault| fault.message.clone());
@@ -36,8 +35,15 @@ pub fn part(steps: &[Step], file: &str, name: &str) -> Result<String, Vec<Diagno
     })
 }
 
+fn part(steps: &[Step], name: &str, family: &str) -> String {
+    let mut writer = Writer { outlines: Vec::new(), extent: extent(steps), names: Vec::new() };
+    let features = writer.features(steps, true);
+    let outlines: String = writer.outlines.iter().enumerate().map(|(i, o)| outline(i + 1, o)).collect();
+    format!("part {name} {{\nmaterial = {family}_surface\n\n{outlines}{features}}}\n\n")
+}
+
 /// A box around all that is added.
-fn extent(steps: &[Step]) -> [[f64; 3]; 2] {
+pub fn extent(steps: &[Step]) -> [[f64; 3]; 2] {
     let mut found = [[f64::MAX; 3], [f64::MIN; 3]];
     for step in steps.iter().filter(|step| step.op == Op::Add) {
         let corners: Vec<[f64; 3]> = match &step.item {
@@ -95,14 +101,14 @@ struct Writer {
 }
 
 impl Writer {
-    fn features(&mut self, steps: &[Step], top: bool, depth: usize) -> String {
+    fn features(&mut self, steps: &[Step], top: bool) -> String {
         self.names.push(BTreeMap::new());
-        let text = steps.iter().map(|step| self.feature(step, top, depth)).collect();
+        let text = steps.iter().map(|step| self.feature(step, top)).collect();
         self.names.pop();
         text
     }
 
-    fn feature(&mut self, step: &Step, top: bool, depth: usize) -> String {
+    fn feature(&mut self, step: &Step, top: bool) -> String {
         let op = match step.op {
             Op::Add => "add",
             Op::Cut => "cut",
@@ -111,7 +117,7 @@ impl Writer {
         let name = self.name(step);
         match &step.item {
             Item::Group(inner) => {
-                let inner = self.features(inner, false, depth + 1);
+                let inner = self.features(inner, false);
                 format!("{op} {name} = group {{\n{inner}}}\n")
             }
             Item::Solid { shape, place } => {
