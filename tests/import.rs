@@ -184,6 +184,14 @@ fn bodies_that_stand_apart_are_parts_of_their_own() {
     assert!(part.contains("2x cylinder(d = 4, h = 5) on line(pitch = 3)"), "{part}");
 }
 
+/// Copies share a size, so their tops stay level; where they stand side by side it is what keeps them together.
+#[test]
+fn sizes_that_keep_copies_together_are_exact() {
+    let row: String = [0.0, 2.0, 4.0].map(|x| moved([x, 0.0, 0.0], "cube(size = [2, 3, 4], center = false);")).concat();
+    let part = same_volume(&row, 72.0);
+    assert!(part.contains("3x box(x = 2 basic, y = 3, z = 4) at (1, 1.5) on line(pitch = 2)"), "{part}");
+}
+
 #[test]
 fn what_has_no_counterpart_is_named_with_its_place() {
     let csg = "cube(size = 2, center = true);\nhull() {\ncube(size = 1);\nsphere(r = 1);\n}\ntext(text = \"a \\\"b\\\"\");\npolyhedron(points = [], faces = []);\n";

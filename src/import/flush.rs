@@ -25,7 +25,7 @@ struct Face {
 }
 
 enum Form {
-    /// Points p with n · p = offset.
+    /// Points p with n · p = offset; n points out of the shape.
     Plane {
         n: Vector,
         offset: f64,
@@ -51,7 +51,8 @@ pub fn marked(mut steps: Vec<Step>) -> Vec<Step> {
     for (i, a) in faces.iter().enumerate() {
         let others = if all { &[] } else { &faces[i + 1..] };
         for b in others.iter().filter(|b| (a.solid, a.copy) != (b.solid, b.copy)) {
-            if (a.size.is_some() || b.size.is_some()) && touches(&a.form, &b.form) {
+            let sized = a.size.is_some() || b.size.is_some();
+            if sized && !together(a, b) && touches(&a.form, &b.form) {
                 touching.extend([a, b].into_iter().filter_map(|f| f.size.map(|size| (f.solid, size))));
             }
         }
@@ -94,14 +95,14 @@ fn forms(shape: &Shape, place: &Placement) -> Vec<(Option<&'static str>, Form)> 
     let direction = |v: Vector| minus(place.point(v), origin);
     let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(direction);
     let plane = |n: Vector, p: Vector| Form::Plane { n, offset: dot(n, place.point(p)) };
-    let ends = |h: f64, size| vec![(None, plane(z, [0.0; 3])), (Some(size), plane(z, [0.0, 0.0, h]))];
+    let ends = |h: f64, size| vec![(None, plane(z.map(|v| -v), [0.0; 3])), (Some(size), plane(z, [0.0, 0.0, h]))];
     let side = |size, d: f64| (Some(size), Form::Cylinder { on: origin, axis: z, r: d / 2.0 });
     match shape {
         Shape::Box { x: a, y: b, z: h } => {
             let across = [(x, [*a, 0.0, 0.0], "x"), (y, [0.0, *b, 0.0], "y")];
-            let sides = across
-                .into_iter()
-                .flat_map(|(n, p, size)| [0.5, -0.5].map(|half| (Some(size), plane(n, p.map(|v| v * half)))));
+            let sides = across.into_iter().flat_map(|(n, p, size)| {
+                [1.0, -1.0].map(|side| (Some(size), plane(n.map(|v| v * side), p.map(|v| v * side / 2.0))))
+            });
             ends(*h, "z").into_iter().chain(sides).collect()
         }
         Shape::Cylinder { d, h } => ends(*h, "h").into_iter().chain([side("d", *d)]).collect(),
@@ -125,6 +126,12 @@ fn forms(shape: &Shape, place: &Placement) -> Vec<(Option<&'static str>, Form)> 
             rims.collect()
         }
     }
+}
+
+/// Whether two faces are the same side of two copies: they share their size, and move alike.
+fn together(a: &Face, b: &Face) -> bool {
+    let same = (a.solid, a.size) == (b.solid, b.size);
+    same && matches!((&a.form, &b.form), (Form::Plane { n, .. }, Form::Plane { n: m, .. }) if dot(*n, *m) > 0.0)
 }
 
 /// Whether one lies in the other, or along it.
