@@ -13,6 +13,10 @@ pub const LARGEST: f64 = STEPS[STEPS.len() - 1];
 /// First grade of [`GRADES`].
 const FIRST_GRADE: u32 = 4;
 
+/// First grade beyond [`GRADES`], and the last there is here.
+const FIRST_COARSE: u32 = 13;
+const LAST_GRADE: u32 = 17;
+
 /// Standard tolerances IT4 to IT12 in µm, a row per grade and a column per step.
 const GRADES: [[u16; 13]; 9] = [
     [3, 4, 4, 5, 6, 7, 8, 10, 12, 14, 16, 18, 20],
@@ -53,7 +57,7 @@ pub fn is_hole_class(class: &str) -> bool {
 
 /// Lower and upper deviation in mm of `class` (`H7`, `g6`, `js7`) at a nominal size in mm.
 ///
-/// Covers d to h, js, k, m, n, p and their holes in the grades 4 to 12, over 0 mm up to [`LARGEST`].
+/// Covers d to h, js, k, m, n, p and their holes in the grades 4 to 17, over 0 mm up to [`LARGEST`].
 pub fn fit(class: &str, size: f64) -> Result<[f64; 2], FitError> {
     let digits = class.find(|c: char| c.is_ascii_digit()).ok_or(FitError::UnknownClass)?;
     let (letter, grade) = (&class[..digits], class[digits..].parse().map_err(|_| FitError::UnknownClass)?);
@@ -114,8 +118,11 @@ fn shaft_zone(letter: &str, grade: u32, step: usize, width: i32) -> [i32; 2] {
     }
 }
 
-/// Width of the tolerance zone of a grade in µm.
+/// Width of the tolerance zone of a grade in µm. From IT13 on it is ten times that of the grade five finer.
 fn standard_tolerance(grade: u32, size: f64) -> Result<i32, FitError> {
+    if (FIRST_COARSE..=LAST_GRADE).contains(&grade) {
+        return Ok(10 * standard_tolerance(grade - 5, size)?);
+    }
     let row = grade.checked_sub(FIRST_GRADE).and_then(|i| GRADES.get(i as usize)).ok_or(FitError::UnknownClass)?;
     Ok(i32::from(row[step(size).ok_or(FitError::OutsideTable)?]))
 }
@@ -220,6 +227,12 @@ mod tests {
             ("N9", 20.0, [-52, 0]),
             ("F7", 20.0, [20, 41]),
             ("js6", 20.0, [-6, 6]),
+            ("h13", 10.0, [-220, 0]),
+            ("h14", 50.0, [-620, 0]),
+            ("js15", 20.0, [-420, 420]),
+            ("js15", 100.0, [-700, 700]),
+            ("h16", 120.0, [-2200, 0]),
+            ("js17", 260.0, [-2600, 2600]),
         ];
         for (class, size, deviations) in published {
             assert_eq!(microns(class, size), deviations, "{size} {class}");
@@ -236,7 +249,7 @@ mod tests {
 
     #[test]
     fn unknown_classes_are_refused() {
-        for class in ["H73", "H0", "H", "x7", "Js7", "", "H99999999999"] {
+        for class in ["H73", "h18", "H0", "H", "x7", "Js7", "", "H99999999999"] {
             assert_eq!(fit(class, 10.0), Err(FitError::UnknownClass), "{class}");
         }
     }

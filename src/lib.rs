@@ -54,6 +54,8 @@ pub mod artifacts;
 #[cfg(feature = "compile")]
 pub mod golden;
 #[cfg(feature = "compile")]
+pub mod import;
+#[cfg(feature = "compile")]
 mod line;
 
 #[cfg(feature = "cli")]

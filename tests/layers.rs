@@ -31,6 +31,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ),
     ("golden", &[]),
     ("lsp", &["design", "syntax", "iso", "diag", "units"]),
+    ("import", &["syntax", "diag"]),
     (
         "artifacts",
         &[

@@ -6,11 +6,13 @@ use gonogo::syntax::ast::{Body, File, Gap, Line, Shape, Stmt};
 use gonogo::syntax::{format, parse};
 use proptest::prelude::*;
 
-const SPECS: [&str; 4] = [
+const SPECS: [&str; 6] = [
     include_str!("../specs/pattern_wheel.gng"),
     include_str!("../specs/four_screws.gng"),
     include_str!("../specs/pinned_plate.gng"),
     include_str!("../specs/shapes.gng"),
+    include_str!("../specs/bearing_block.gng"),
+    include_str!("../specs/std/iso4762.gng"),
 ];
 
 /// The tree without blank lines, which are layout.
@@ -32,6 +34,8 @@ fn strip_lines(lines: &mut [Line]) {
         match &mut line.stmt {
             Stmt::Material { body, .. }
             | Stmt::Part { body, .. }
+            | Stmt::Family { body, .. }
+            | Stmt::Table { body, .. }
             | Stmt::Outline { body, .. }
             | Stmt::Assembly { body, .. }
             | Stmt::Station { body, .. }

@@ -73,6 +73,8 @@ pub enum Command {
     /// Compare the outputs of the stages with blessed ones, or bless them.
     #[command(subcommand)]
     Golden(Golden),
+    /// Turn an OpenSCAD design (`openscad -o part.csg part.scad`) into a part with general tolerances.
+    Import(Import),
     /// Compile the pattern wheel, calibrate it, and judge the photos that come with it.
     Demo(Demo),
     /// Serve editors: the Language Server Protocol on standard input and output.
@@ -300,6 +302,18 @@ pub struct GoldenBless {
     /// Say what would change and change nothing.
     #[arg(long)]
     pub dry_run: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Import {
+    /// The design as OpenSCAD's `.csg`, or `-` for standard input.
+    pub design: PathBuf,
+    /// Where the part goes; standard output unless given.
+    #[arg(short, long, value_name = "SPEC")]
+    pub output: Option<PathBuf>,
+    /// What the part is called; like its file unless given.
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
 }
 
 #[derive(Debug, Args)]

@@ -10,6 +10,7 @@ mod fix;
 mod font;
 mod format;
 mod golden;
+mod import;
 mod judge;
 mod lsp;
 mod messages;
@@ -69,6 +70,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Explain(args) => explain(args),
         Command::Golden(Golden::Check(args)) => golden::check(args, global),
         Command::Golden(Golden::Bless(args)) => golden::bless(args, global),
+        Command::Import(args) => import::import(args, global),
         Command::Demo(args) => demo::demo(args, global),
         Command::Lsp(_) => lsp::lsp(),
     }

@@ -3,6 +3,7 @@
 //! In: `root` and `place` statements. Out: components, parents before their children, each with its part, the frame it
 //! is placed in and its pose with its tolerance zone.
 
+use super::family::Family;
 use super::fields::Fields;
 use super::model::{Component, Expr, Part, PoseExpr};
 use super::part::PartSource;
@@ -31,6 +32,7 @@ const AXES: [(&str, Quantity); 6] = [
 /// The parts and materials that placements refer to.
 pub struct Catalogue<'a> {
     pub parts: BTreeMap<&'a str, PartSource<'a>>,
+    pub families: BTreeMap<&'a str, Family<'a>>,
     pub materials: BTreeMap<&'a str, usize>,
 }
 
@@ -154,6 +156,10 @@ impl Resolver {
         built: &mut Assembled,
     ) -> Option<usize> {
         let Some(source) = catalogue.parts.get(wanted.text.as_str()) else {
+            if let Some(family) = catalogue.families.get(wanted.text.as_str()) {
+                self.family_placed(wanted, *family);
+                return None;
+            }
             self.unknown_part(wanted, catalogue);
             return None;
         };

@@ -4,6 +4,8 @@
 
 use super::assemble::{Assembled, Catalogue};
 use super::beside;
+use super::family::Family;
+use super::library;
 use super::model::{Design, Material, Station};
 use super::part::PartSource;
 use super::scope::{Named, Resolver, Title};
@@ -27,7 +29,7 @@ pub struct Loaded {
     /// `None` when there are errors.
     pub design: Option<Design>,
     pub diagnostics: Vec<Diagnostic>,
-    /// The files that were read, in the order of their first use.
+    /// The files that were read, in the order of their first use; those of the parts library are none.
     pub inputs: Vec<String>,
     /// All that the design depends on, in one text without file names: what a model's digest covers.
     pub text: String,
@@ -56,7 +58,8 @@ pub(super) fn load_with(path: &str, read: Read, set: &[(String, String)], mut re
     let mut loader =
         Loader { read, sources: Sources::default(), trees: Vec::new(), diagnostics: Vec::new(), open: Vec::new() };
     loader.file(path, None);
-    let inputs: Vec<String> = loader.sources.files.iter().map(|(name, _)| name.clone()).collect();
+    let names = loader.sources.files.iter().map(|(name, _)| name);
+    let inputs: Vec<String> = names.filter(|name| library::text(name).is_none()).cloned().collect();
     let overrides = loader.overrides(set);
     let text = digest_text(&loader.sources);
     let Loader { sources, trees, mut diagnostics, .. } = loader;
@@ -125,7 +128,12 @@ impl Loader<'_> {
                 .push(Diagnostic::error("E0212", from.unwrap_or_default(), message).label("one too many"));
         }
         let file = self.sources.files.len() as u32;
-        let text = match (self.read)(path) {
+        let read = match library::is_meant(path).then(|| library::text(path)) {
+            Some(Some(text)) => Ok(text.to_string()),
+            Some(None) if from.is_some() => return self.not_in_library(path, from.unwrap_or_default()),
+            _ => (self.read)(path),
+        };
+        let text = match read {
             Ok(text) => text,
             Err(error) => return self.unreadable(path, from, &error),
         };
@@ -137,7 +145,8 @@ impl Loader<'_> {
         let uses: Vec<ast::Name> = tree.lines.iter().filter_map(as_use).cloned().collect();
         self.trees.push(Tree { file, used: from.is_some(), tree });
         for name in uses {
-            self.file(&path_beside(path, &name.text), Some(name.span));
+            let file = if library::is_meant(&name.text) { name.text.clone() } else { path_beside(path, &name.text) };
+            self.file(&file, Some(name.span));
         }
         self.open.pop();
     }
@@ -148,6 +157,15 @@ impl Loader<'_> {
         }
         let message = format!("`{path}` cannot be read: {error}");
         self.diagnostics.push(Diagnostic::error("E0201", from.unwrap_or_default(), message).label("no such file"));
+    }
+
+    fn not_in_library(&mut self, name: &str, span: Span) {
+        let message = format!("the parts library has no `{name}`");
+        let diagnostic = Diagnostic::error("E0201", span, message).label("not in the library");
+        self.diagnostics.push(match library::nearest_file(name) {
+            Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+            None => diagnostic.help(format!("a file of your own ends in `.gng`: `use \"{name}.gng\"`")),
+        });
     }
 
     fn cycle(&mut self, path: &str, span: Span) {
@@ -245,12 +263,22 @@ pub fn path_beside(path: &str, name: &str) -> String {
     steps.join("/")
 }
 
+/// Where a part, a family or a member of that name stands already.
+fn first_part(name: &ast::Name, blocks: &Blocks) -> Option<Span> {
+    let parts = blocks.parts.iter().map(|(part, _)| part.name);
+    let families = blocks.families.iter().map(|(family, _)| family.name);
+    let members = blocks.members.iter().map(|(member, ..)| *member);
+    parts.chain(families).chain(members).find(|known| known.text == name.text).map(|known| known.span)
+}
+
 /// The blocks of all files by kind, in the order that gives the spec's own stations the first place.
 #[derive(Default)]
 struct Blocks<'a> {
     lets: Vec<(&'a ast::Name, &'a ast::Dim, bool)>,
     materials: Vec<(&'a ast::Name, &'a ast::Body, bool)>,
     parts: Vec<(PartSource<'a>, bool)>,
+    families: Vec<(Family<'a>, bool)>,
+    members: Vec<(&'a ast::Name, &'a ast::Call, bool)>,
     assembly: Option<(&'a ast::Name, &'a ast::Body)>,
     stations: Vec<(&'a ast::Name, &'a ast::Body)>,
     inspect: Option<(Option<&'a ast::Name>, &'a ast::Body, Span)>,
@@ -258,11 +286,17 @@ struct Blocks<'a> {
 }
 
 fn resolve(resolver: &mut Resolver, trees: &[Tree], overrides: &[(ast::Name, ast::Dim)]) -> Design {
-    let blocks = resolver.collect(trees, overrides);
+    let mut blocks = resolver.collect(trees, overrides);
+    let families: BTreeMap<&str, Family> =
+        blocks.families.iter().rev().map(|(f, _)| (f.name.text.as_str(), *f)).collect();
+    for (name, call, used) in std::mem::take(&mut blocks.members) {
+        blocks.parts.push((resolver.member(name, call, &families), used));
+    }
     let materials: Vec<Material> =
         blocks.materials.iter().map(|(name, body, _)| resolver.material(name, body)).collect();
     let catalogue = Catalogue {
         parts: blocks.parts.iter().rev().map(|(part, _)| (part.name.text.as_str(), *part)).collect(),
+        families,
         materials: blocks.materials.iter().enumerate().rev().map(|(i, m)| (m.0.text.as_str(), i)).collect(),
     };
     let mut built = Assembled::default();
@@ -355,9 +389,16 @@ impl Resolver {
                 blocks.materials.push((name, body, used));
             }
             Stmt::Part { name, body } => {
-                let first = blocks.parts.iter().find(|(p, _)| p.name.text == name.text).map(|(p, _)| p.name.span);
-                self.block_name("part", name, first);
-                blocks.parts.push((PartSource { name, body }, used));
+                self.block_name("part", name, first_part(name, blocks));
+                blocks.parts.push((PartSource { name, body, member: None }, used));
+            }
+            Stmt::Family { name, params, body } => {
+                self.block_name("family", name, first_part(name, blocks));
+                blocks.families.push((Family { name, params, body }, used));
+            }
+            Stmt::Member { name, call } => {
+                self.block_name("part", name, first_part(name, blocks));
+                blocks.members.push((name, call, used));
             }
             Stmt::Assembly { name, body } => {
                 self.block_name("assembly", name, blocks.assembly.map(|(first, _)| first.span));
@@ -450,16 +491,17 @@ impl Resolver {
 
     /// Parts that are placed nowhere are still checked, on a copy of the stage that is thrown away.
     fn unplaced(&mut self, blocks: &Blocks, catalogue: &Catalogue, built: &Assembled) {
-        let idle = blocks.parts.iter().filter(|(source, _)| !built.placed.contains(&source.name.text));
+        // Those of a file that is used are its own affair: a library may hold what nobody needs here.
+        let idle = blocks.parts.iter().filter(|(source, used)| !used && !built.placed.contains(&source.name.text));
         let idle: Vec<_> = idle.collect();
         if idle.is_empty() {
             return;
         }
         let mut scratch = self.clone();
         let mut parts = Vec::new();
-        for (source, used) in idle {
+        for (source, _) in idle {
             parts.push(scratch.part(*source, &source.name.text, &catalogue.materials));
-            if !used && blocks.assembly.is_some() {
+            if blocks.assembly.is_some() {
                 let message = format!("part `{}` is never placed", source.name.text);
                 scratch.report(
                     Diagnostic::warning("W0209", source.name.span, message)
@@ -479,6 +521,11 @@ impl Resolver {
         for (name, _, _) in blocks.lets.iter().filter(|(_, _, used)| !used) {
             if !self.is_used(name.span) {
                 self.unused("dimension", &name.text, name.span);
+            }
+        }
+        for (family, _) in blocks.families.iter().filter(|(_, used)| !used) {
+            if !self.used_families.contains(&family.name.text) {
+                self.unused("family", &family.name.text, family.name.span);
             }
         }
         for (i, (name, _, used)) in blocks.materials.iter().enumerate() {

@@ -67,6 +67,10 @@ impl Resolver {
     fn face(&mut self, face: &ast::Face, built: &Assembled) -> Option<FacePath> {
         let component = self.one_component(&face.component, built)?;
         let part = &built.parts[built.components[component].part];
+        // A part that could not be made has no faces, and why has been said.
+        if part.features.is_empty() {
+            return None;
+        }
         self.face_of(&format!("part `{}`", part.name), &part.features, &face.face.text, face.face.span)?;
         Some(FacePath { component, face: face.face.text.clone(), span: face.span })
     }

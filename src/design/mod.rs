@@ -6,10 +6,12 @@
 mod assemble;
 mod beside;
 mod dimension;
+mod family;
 mod feature;
 mod fields;
 mod hole;
 mod interval;
+pub mod library;
 mod load;
 mod material;
 mod measure;

@@ -1,5 +1,6 @@
 //! `part`: names, material and outlines of a part, and its feature list.
 
+use super::family::Member;
 use super::feature::{Context, MAX_COPIES};
 use super::fields::Fields;
 use super::model::Part;
@@ -19,13 +20,18 @@ const MAX_LINES_IN_ALL: u64 = 200_000;
 pub struct PartSource<'a> {
     pub name: &'a ast::Name,
     pub body: &'a ast::Body,
+    /// Of which family, and in which size.
+    pub member: Option<Member<'a>>,
 }
 
 impl Resolver {
     /// One piece of a part. Its dimensions are named under `path`: the part's name, or the component's when the part
     /// is placed more than once, so that every piece has draws of its own.
     pub fn part(&mut self, source: PartSource, path: &str, materials: &BTreeMap<&str, usize>) -> Part {
-        self.locals = self.part_names(source.body, path);
+        let Some(names) = self.part_names(source, path) else {
+            return Part { name: source.name.text.clone(), material: 0, features: Vec::new(), span: source.name.span };
+        };
+        self.locals = names;
         self.outlines = BTreeMap::new();
         let bounded = self.few_enough(source);
         self.draw_outlines(source.body, path);
@@ -56,14 +62,19 @@ impl Resolver {
         true
     }
 
-    fn part_names(&mut self, body: &ast::Body, path: &str) -> BTreeMap<String, Named> {
-        let mut names: BTreeMap<String, Named> = BTreeMap::new();
-        for line in &body.lines {
+    /// The named dimensions of a part; `None` for a member of a family in a size it does not have.
+    fn part_names(&mut self, source: PartSource, path: &str) -> Option<BTreeMap<String, Named>> {
+        self.locals = BTreeMap::new();
+        let mut names = match source.member {
+            Some(member) => self.member_names(member, path)?,
+            None => BTreeMap::new(),
+        };
+        for line in &source.body.lines {
             if let Stmt::Let { name, dim } = &line.stmt {
                 self.define(&mut names, name, dim, format!("{path}.{}", name.text));
             }
         }
-        names
+        Some(names)
     }
 
     /// Adds a `let` to a table, unless its name is taken or is a word of the language.
@@ -128,6 +139,10 @@ impl Resolver {
     fn part_material(&mut self, source: PartSource, materials: &BTreeMap<&str, usize>) -> usize {
         let fields = Fields::of_body(&format!("part {}", source.name.text), source.name.span, source.body);
         self.check_fields(&fields, &["material"]);
+        // What a member is made of, it may say itself.
+        if let Some(value) = source.member.and_then(|m| Fields::of_args(&m.call.name, &m.call.args).get("material")) {
+            return self.material_named(value, materials);
+        }
         match fields.get("material") {
             None => {
                 let example = materials.keys().next().copied().unwrap_or("steel");

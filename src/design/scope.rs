@@ -62,6 +62,11 @@ impl Named {
     pub fn new(name: &ast::Name, dim: &ast::Dim, path: String) -> Self {
         Named { dim: dim.clone(), span: name.span, path, shared: None, nominal: None, busy: false }
     }
+
+    /// A name whose value is known already.
+    pub fn given(name: &ast::Name, dim: &ast::Dim, path: String, shared: Typed, nominal: Typed) -> Self {
+        Named { shared: Some(shared), nominal: Some(nominal), ..Named::new(name, dim, path) }
+    }
 }
 
 /// What the drawing says of a dimension beyond its range.
@@ -87,6 +92,8 @@ pub struct Resolver {
     pub locals: BTreeMap<String, Named>,
     /// Names that were used: what is not is warned of.
     pub used: BTreeSet<Span2>,
+    /// Families that a member was taken from.
+    pub used_families: BTreeSet<String>,
     /// Indices of the materials in use.
     pub used_materials: BTreeSet<usize>,
     /// Where units are written: what has the wrong one is shown with another.
@@ -167,6 +174,8 @@ impl Resolver {
         };
         let cached = if usage == Use::Shared { &named.shared } else { &named.nominal };
         if let Some(value) = cached.clone() {
+            let span = named.span;
+            self.mark_used(span);
             return Some(value);
         }
         let named = named.clone();

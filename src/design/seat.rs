@@ -68,7 +68,8 @@ impl Resolver {
 
     fn feature_named<'f>(&mut self, owner: &str, features: &'f [Feature], name: &ast::Name) -> Option<&'f Feature> {
         let found = features.iter().find(|f| f.name == name.text);
-        if found.is_none() && !self.failed.contains(&name.text) {
+        // A part that could not be made has no features, and why has been said.
+        if found.is_none() && !features.is_empty() && !self.failed.contains(&name.text) {
             let message = format!("{owner} has no feature `{}`", name.text);
             let diagnostic = Diagnostic::error("E0201", name.span, message).label("unknown feature");
             let names = features.iter().map(|f| f.name.as_str());

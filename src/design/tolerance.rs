@@ -143,7 +143,7 @@ impl Resolver {
                 let fault = Diagnostic::error("E0302", class.span, format!("no ISO 286 class `{}`", class.text))
                     .label("unknown class")
                     .note("a class is a letter and a grade, such as `H7` for a hole or `g6` for a shaft")
-                    .note("known: d e f g h js k m n p and D to P, grades 4 to 12");
+                    .note("known: d e f g h js k m n p and D to P, grades 4 to 17");
                 match nearest_class(&class.text, nominal) {
                     Some(near) => fault.meant(class.span, &near),
                     None => fault,

@@ -20,6 +20,7 @@ const PAGES: &[(&str, &str)] = &[
     ("E0211", include_str!("explain/E0211.md")),
     ("E0212", include_str!("explain/E0212.md")),
     ("E0213", include_str!("explain/E0213.md")),
+    ("E0214", include_str!("explain/E0214.md")),
     ("E0301", include_str!("explain/E0301.md")),
     ("E0302", include_str!("explain/E0302.md")),
     ("E0303", include_str!("explain/E0303.md")),
@@ -59,6 +60,9 @@ const PAGES: &[(&str, &str)] = &[
     ("E0806", include_str!("explain/E0806.md")),
     ("E0807", include_str!("explain/E0807.md")),
     ("E0808", include_str!("explain/E0808.md")),
+    ("E0901", include_str!("explain/E0901.md")),
+    ("E0902", include_str!("explain/E0902.md")),
+    ("E0903", include_str!("explain/E0903.md")),
 ];
 
 /// The page of a code such as `E0305`; `None` for a code that does not exist.

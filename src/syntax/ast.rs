@@ -65,6 +65,28 @@ pub enum Stmt {
         name: Name,
         body: Body,
     },
+    /// `part iso2338(d, l) { … }`: a part drawn once for many sizes.
+    Family {
+        name: Name,
+        params: Vec<Name>,
+        body: Body,
+    },
+    /// `part pin = iso2338(d = 6, l = 20)`
+    Member {
+        name: Name,
+        call: Call,
+    },
+    /// `table d (k, s) { … }` of a family, with a column of cells for each name.
+    Table {
+        name: Name,
+        columns: Vec<Name>,
+        body: Body,
+    },
+    /// `row M6 = (5.82 .. 6, 10)`
+    Row {
+        key: Name,
+        cells: Vec<Dim>,
+    },
     Feature(Box<Feature>),
     Outline {
         name: Name,

@@ -4,6 +4,7 @@
 //! digits, and formatting twice changes nothing. A text with syntax errors is left alone.
 
 use super::ast::*;
+use super::table;
 use crate::diag::Diagnostic;
 
 /// Longer lines have their arguments one per line.
@@ -27,13 +28,17 @@ pub fn format(text: &str) -> Result<String, Vec<Diagnostic>> {
 
 fn lines(out: &mut String, lines: &[Line], depth: usize) {
     let widths = run_widths(lines);
+    let columns = table::widths(lines);
     for (i, line) in lines.iter().enumerate() {
         gaps(out, &line.before, depth, i == 0);
         let after_block = i > 0 && depth == 0 && (body(&line.stmt).is_some() || body(&lines[i - 1].stmt).is_some());
         if after_block && line.before.is_empty() {
             out.push('\n');
         }
-        statement(out, line, depth, widths[i]);
+        match table::row(line, &columns) {
+            Some(row) => indented(out, depth, &row),
+            None => statement(out, line, depth, widths[i]),
+        }
     }
 }
 
@@ -113,6 +118,8 @@ fn body(stmt: &Stmt) -> Option<&Body> {
     match stmt {
         Stmt::Material { body, .. }
         | Stmt::Part { body, .. }
+        | Stmt::Family { body, .. }
+        | Stmt::Table { body, .. }
         | Stmt::Outline { body, .. }
         | Stmt::Assembly { body, .. }
         | Stmt::Station { body, .. }
@@ -168,6 +175,11 @@ fn head_and_tail(stmt: &Stmt, width: usize, layout: Layout) -> String {
         Stmt::Watch { path, args: Some(list) } => format!("watch {} {}", path_text(path), args(list, layout)),
         Stmt::Ignore(path) => format!("ignore {}", path_text(path)),
         Stmt::Train(_) => "train".to_string(),
+        Stmt::Family { name, params, .. } => format!("part {}{}", name.text, table::names(params)),
+        Stmt::Table { name, columns, .. } => format!("table {} {}", name.text, table::names(columns)),
+        Stmt::Member { name, call: c } => format!("part {} = {}", name.text, call(c, layout)),
+        // Rows are laid out with those of their table.
+        Stmt::Row { .. } => String::new(),
         Stmt::Let { .. } | Stmt::Feature(_) | Stmt::Light { .. } | Stmt::Measure(_) | Stmt::Field { .. } => {
             String::new()
         }
@@ -269,7 +281,7 @@ fn point(p: &Point) -> String {
     format!("({}){}", p.dims.iter().map(dim).collect::<Vec<_>>().join(", "), unit_text(&p.unit))
 }
 
-fn dim(d: &Dim) -> String {
+pub(super) fn dim(d: &Dim) -> String {
     let size = match &d.size {
         Size::Quantity(q) => quantity(q),
         Size::Sum(s) => format!("({})", sum(s)),

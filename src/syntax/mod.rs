@@ -11,6 +11,7 @@ mod heads;
 mod letters;
 mod parse;
 mod scan;
+mod table;
 
 pub use format::format;
 pub use parse::parse;

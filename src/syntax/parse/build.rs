@@ -76,6 +76,7 @@ impl Builder {
             Rule::material => {
                 Stmt::Material { name: self.name(&inner.take(Rule::name)), body: self.body(inner.last()) }
             }
+            Rule::family | Rule::table | Rule::row | Rule::member => self.family(rule, &inner),
             Rule::part => Stmt::Part { name: self.name(&inner.take(Rule::name)), body: self.body(inner.last()) },
             Rule::assembly => {
                 Stmt::Assembly { name: self.name(&inner.take(Rule::name)), body: self.body(inner.last()) }
@@ -108,6 +109,32 @@ impl Builder {
             Rule::ignore => Stmt::Ignore(self.path(inner.take(Rule::path))),
             _ => Stmt::Field { key: self.name(&inner.take(Rule::key)), value: self.value(inner.last()) },
         }
+    }
+
+    /// What a drawing with a table of sizes is written with.
+    fn family(&self, rule: Rule, inner: &Children) -> Stmt {
+        let params = || self.params(inner.take(Rule::params));
+        match rule {
+            Rule::row => Stmt::Row {
+                key: self.name(&inner.take(Rule::row_key)),
+                cells: Children::of(inner.last()).all(Rule::dim).into_iter().map(|p| self.dim(p)).collect(),
+            },
+            Rule::member => Stmt::Member { name: self.name(&inner.take(Rule::name)), call: self.call(inner.last()) },
+            Rule::table => Stmt::Table {
+                name: self.name(&inner.take(Rule::name)),
+                columns: params(),
+                body: self.body(inner.last()),
+            },
+            _ => Stmt::Family {
+                name: self.name(&inner.take(Rule::name)),
+                params: params(),
+                body: self.body(inner.last()),
+            },
+        }
+    }
+
+    fn params(&self, pair: Node) -> Vec<Name> {
+        Children::of(pair).all(Rule::name).iter().map(|p| self.name(p)).collect()
     }
 
     fn feature(&self, inner: Children) -> Feature {
@@ -225,8 +252,16 @@ impl Builder {
                     inner.all(Rule::integer).iter().map(|p| p.as_str().parse().unwrap_or(u64::MAX)).collect();
                 Value::Extent { width: sides[0], height: sides[1], unit: self.unit(&inner), span }
             }
+            Rule::thread => Value::Dim(self.thread(&pair)),
             _ => Value::Dim(self.dim(pair)),
         }
+    }
+
+    /// `M2.5`: one word, although a name holds no point.
+    fn thread(&self, pair: &Node) -> Dim {
+        let (name, span) = (self.name(pair), self.span(pair));
+        let path = Path { segments: vec![Segment { name, index: None }], span };
+        Dim { size: Size::Path(path), tolerance: None, each: false, span }
     }
 
     fn point(&self, pair: Node) -> Point {

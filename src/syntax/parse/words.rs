@@ -11,7 +11,10 @@ pub fn words(rule: Rule) -> &'static [&'static str] {
         Rule::use_file => &["`use`"],
         Rule::let_dim => &["`let`"],
         Rule::material => &["`material`"],
-        Rule::part => &["`part`"],
+        Rule::part | Rule::family | Rule::member => &["`part`"],
+        Rule::table => &["`table`"],
+        Rule::row => &["`row`"],
+        Rule::row_key => &["a size such as `6` or `M6`"],
         Rule::assembly => &["`assembly`"],
         Rule::station => &["`station`"],
         Rule::inspect => &["`inspect`"],
@@ -62,6 +65,7 @@ pub fn words(rule: Rule) -> &'static [&'static str] {
         Rule::index => &["`[`"],
         Rule::field_body
         | Rule::part_body
+        | Rule::table_body
         | Rule::outline_body
         | Rule::assembly_body
         | Rule::station_body
