@@ -1,6 +1,10 @@
 //! What can be said on the command line.
 
+use super::deps::{Deps, DepsFormat};
+use super::keep::Keeping;
 use super::output::Failure;
+use super::shells::{Completions, Man};
+use super::watch::Watch;
 use crate::artifacts::Artifact;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
@@ -73,6 +77,10 @@ pub enum Command {
     Golden(Golden),
     /// Compile the pattern wheel, calibrate it, and judge the photos that come with it.
     Demo(Demo),
+    /// Print a script that completes commands and options in a shell.
+    Completions(Completions),
+    /// Write the manual pages.
+    Man(Man),
 }
 
 #[derive(Debug, Args)]
@@ -105,12 +113,15 @@ pub struct Compile {
     /// Write the outputs of these stages; the model itself only if it is among them or `-o` is given.
     #[arg(long, value_name = "STAGE,…", value_delimiter = ',', value_parser = stages())]
     pub emit: Vec<Artifact>,
-    /// Write what the outputs depend on, in the syntax of make.
-    #[arg(long, value_name = "FILE")]
-    pub deps: Option<PathBuf>,
-    /// Fail if the compiler would have to choose anything anew. Not available yet.
+    #[command(flatten)]
+    pub deps: Deps,
+    /// Fail if the compiler would have to choose anything that `NAME.lock.ron` beside the spec does not hold.
     #[arg(long)]
     pub locked: bool,
+    #[command(flatten)]
+    pub keeping: Keeping,
+    #[command(flatten)]
+    pub watch: Watch,
     #[command(flatten)]
     pub variant: Variant,
     #[command(flatten)]
@@ -124,6 +135,13 @@ pub struct Check {
     pub specs: Vec<PathBuf>,
     #[command(flatten)]
     pub variant: Variant,
+    /// Write this empty file if all is fine: something for a build tool to look at.
+    #[arg(long, value_name = "FILE")]
+    pub stamp: Option<PathBuf>,
+    #[command(flatten)]
+    pub deps: Deps,
+    #[command(flatten)]
+    pub watch: Watch,
 }
 
 #[derive(Debug, Args)]
@@ -281,6 +299,19 @@ fn assignment(text: &str) -> Result<(String, String), String> {
         return Err("expected NAME=VALUE".into());
     }
     Ok((name.trim().into(), value.trim().into()))
+}
+
+impl Check {
+    /// A rule of make is about a target, and what a check makes is its stamp.
+    pub fn refuse_rule_without_target(&self) -> Result<(), Failure> {
+        let is_rule = self.deps.file.is_some() && self.deps.format == DepsFormat::Make;
+        match is_rule && self.stamp.is_none() {
+            true => {
+                Err(Failure("a rule of make needs a target: give `--stamp FILE`, or another `--deps-format`".into()))
+            }
+            false => Ok(()),
+        }
+    }
 }
 
 impl Variant {

@@ -5,10 +5,12 @@
 mod args;
 mod compile;
 mod demo;
+mod deps;
 mod font;
 mod format;
 mod golden;
 mod judge;
+mod keep;
 mod messages;
 mod output;
 mod overlay;
@@ -17,7 +19,9 @@ mod progress;
 mod prove;
 pub mod report;
 mod report_page;
+mod shells;
 mod verdict;
+mod watch;
 
 use args::{Cli, Command, Explain, Golden};
 use clap::Parser;
@@ -64,6 +68,8 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Golden(Golden::Check(args)) => golden::check(args, global),
         Command::Golden(Golden::Bless(args)) => golden::bless(args, global),
         Command::Demo(args) => demo::demo(args, global),
+        Command::Completions(args) => shells::completions(args),
+        Command::Man(args) => shells::man(args),
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod assemble;
 mod dimension;
+pub mod essence;
 mod feature;
 mod fields;
 mod hole;
