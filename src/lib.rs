@@ -10,6 +10,8 @@
 #![cfg_attr(not(feature = "c"), forbid(unsafe_code))]
 
 #[cfg(feature = "compile")]
+pub mod cache;
+#[cfg(feature = "compile")]
 pub mod diag;
 #[cfg(feature = "compile")]
 pub mod iso;
@@ -51,6 +53,8 @@ pub mod runtime;
 
 #[cfg(feature = "compile")]
 pub mod artifacts;
+#[cfg(feature = "compile")]
+pub mod build;
 #[cfg(feature = "compile")]
 pub mod golden;
 #[cfg(feature = "compile")]
@@ -101,7 +105,8 @@ pub fn prove(
     let options = Options { wanted: [Artifact::Model].into(), ..options.clone() };
     let mut line = line::Line::new(&options, observer);
     if let Some(ready) = ready(spec, read, &mut line) {
-        let job = ready.job();
+        // Renders that are to be fresh are neither kept nor found.
+        let job = ready.job(None);
         if job.spec == model.spec {
             let proof = train::prove::prove(&job, model, trials, &|step, i, n| line.tell(step.into(), i, n));
             line.out.proof = line.accept(proof);
@@ -114,7 +119,8 @@ pub fn prove(
 #[cfg(feature = "compile")]
 fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     let ready = ready(spec, read, line)?;
-    let trained = train::train(&ready.job(), &|step, done, total| line.tell(step.into(), done, total));
+    let job = ready.job(line.options.cache.as_deref());
+    let trained = train::train(&job, &|step, done, total| line.tell(step.into(), done, total));
     let (model, doubts) = line.accept(trained)?;
     line.out.model = Some(model);
     line.check(((), doubts))
@@ -151,9 +157,14 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
     line.enter(Stage::View)?;
     let bodies = line::bodies(&design, station, &solids);
     let targets = view::choose::targets(&assembly::error_tree::levels(&design, &analysis.liaison));
-    let choice = view::choose::choose(&design, station, &bodies, &targets);
+    let kept = line.kept_choice(&design, station)?;
+    let choice = match kept {
+        Some(placing) => view::choose::keep(&design, station, &bodies, &targets, placing),
+        None => view::choose::choose(&design, station, &bodies, &targets),
+    };
     line.keep(|made| (made.bodies, made.choice) = (bodies.clone(), Some(choice.clone())));
     let camera = line.check((choice.camera, choice.diagnostics.clone()))?;
+    line.lock(&design, station, &choice);
     line.emit(Artifact::View, || artifacts::view(&design, station, &choice));
     line.emit_files(Artifact::Images, || artifacts::images::pictures(&design, station, &camera, &modes()));
 

@@ -8,6 +8,7 @@ use crate::assembly::fault::ErrorMode;
 use crate::assembly::liaison::Liaison;
 use crate::assembly::piece::Workshop;
 use crate::assembly::place::place;
+use crate::cache::Cache;
 use crate::design::Loaded;
 use crate::design::model::{Design, Feature, Op, Part, Station};
 use crate::diag::suggest::nearest;
@@ -15,11 +16,12 @@ use crate::diag::{Diagnostic, Sources};
 use crate::runtime::camera::Camera;
 use crate::runtime::model::Model;
 use crate::scene::Body;
-use crate::scene::build::{self, Instance};
+use crate::scene::build::{self, Instance, Placed};
 use crate::solid::{Quality, Solid};
 use crate::train::prove::Proof;
 use crate::train::{Job, Step, shots};
 use crate::view::choose::Choice;
+use crate::view::lock::{self, Lock, Locked};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -37,6 +39,12 @@ pub struct Options {
     pub keep: bool,
     /// Set from outside when nobody waits for the result any more: no further stage begins.
     pub stop: Option<Arc<AtomicBool>>,
+    /// Where results are kept for the next time; what is made is the same with and without.
+    pub cache: Option<Arc<dyn Cache>>,
+    /// What was chosen before; it stands while what it depended on does.
+    pub lock: Option<Lock>,
+    /// Choose nothing anew: E0605 where the lock has no answer.
+    pub locked: bool,
 }
 
 /// What came of a spec.
@@ -51,6 +59,8 @@ pub struct Compiled {
     pub sources: Sources,
     /// The files that were read.
     pub inputs: Vec<String>,
+    /// The lock with what was chosen this time; `None` where the spec leaves no choice.
+    pub lock: Option<Lock>,
     /// What the stages made on the way, if [`Options::keep`] asked for it.
     pub made: Made,
     /// What [`crate::prove`] measured.
@@ -90,6 +100,19 @@ pub enum Stage {
 }
 
 impl Stage {
+    /// In running order.
+    pub const ALL: [Stage; 9] = [
+        Stage::Design,
+        Stage::Solid,
+        Stage::Assembly,
+        Stage::View,
+        Stage::Plan,
+        Stage::Render,
+        Stage::Fit,
+        Stage::HeldOut,
+        Stage::Verify,
+    ];
+
     pub fn name(self) -> &'static str {
         match self {
             Stage::Design => "design",
@@ -140,7 +163,7 @@ pub(crate) struct Ready {
 }
 
 impl Ready {
-    pub fn job(&self) -> Job<'_> {
+    pub fn job<'a>(&'a self, cache: Option<&'a dyn Cache>) -> Job<'a> {
         Job {
             design: &self.design,
             station: &self.design.stations[self.station],
@@ -149,6 +172,7 @@ impl Ready {
             liaison: &self.liaison,
             tree: &self.tree,
             spec: digest(&self.design),
+            cache,
         }
     }
 }
@@ -195,6 +219,21 @@ impl<'a> Line<'a> {
         let stops = found.iter().any(Diagnostic::is_error);
         self.out.diagnostics.extend(found);
         (!stops).then_some(output)
+    }
+
+    /// The camera's place as it was chosen before; `None` within where it is to be chosen.
+    pub fn kept_choice(&mut self, design: &Design, station: &Station) -> Option<Option<Placed>> {
+        let Options { lock, locked, set, .. } = self.options;
+        self.accept(lock::kept(lock.as_ref(), *locked, design, (station, &lock::entry(station, set))))
+    }
+
+    /// Locks what was chosen where the spec leaves a choice.
+    pub fn lock(&mut self, design: &Design, station: &Station, choice: &Choice) {
+        if lock::is_auto(station) {
+            let locked = Locked::new(design, station, choice.table[choice.best].placing);
+            let entry = lock::entry(station, &self.options.set);
+            self.out.lock = Some(self.options.lock.clone().unwrap_or_default().with(design, entry, locked));
+        }
     }
 
     /// Keeps what a stage made if that is asked for.

@@ -8,6 +8,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("units", &[]),
     ("rng", &[]),
     ("diag", &[]),
+    ("cache", &[]),
     ("iso", &["units"]),
     ("runtime", &[]),
     ("ffi", &["runtime"]),
@@ -23,7 +24,20 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("render", &["scene", "solid", "design", "runtime", "units", "rng"]),
     (
         "train",
-        &["view", "render", "scene", "assembly", "solid", "variation", "design", "runtime", "diag", "units", "rng"],
+        &[
+            "view",
+            "render",
+            "scene",
+            "assembly",
+            "solid",
+            "variation",
+            "design",
+            "runtime",
+            "cache",
+            "diag",
+            "units",
+            "rng",
+        ],
     ),
     (
         "report",
@@ -41,8 +55,22 @@ const HOUSE: &[(&str, &[&str])] = &[
     ),
     (
         "line",
-        &["artifacts", "train", "view", "render", "scene", "assembly", "solid", "design", "runtime", "diag", "units"],
+        &[
+            "artifacts",
+            "train",
+            "view",
+            "render",
+            "scene",
+            "assembly",
+            "solid",
+            "design",
+            "runtime",
+            "cache",
+            "diag",
+            "units",
+        ],
     ),
+    ("build", &["artifacts", "view", "cache", "diag"]),
 ];
 
 /// An outside crate and the files that may use it.
@@ -58,6 +86,9 @@ const DOORS: &[(&str, &[&str])] = &[
     ("lsp_server", &["cli/"]),
     ("lsp_types", &["cli/", "lsp/"]),
 ];
+
+/// Files outside the command line that may know files and clocks: the keeping of results, and what runs in a build script.
+const AT_THE_DOOR: &[&str] = &["cache/folder.rs", "build.rs"];
 
 /// What only the command line does.
 const CLI_ONLY: &[&str] =
@@ -112,7 +143,8 @@ fn outside_tools_come_in_through_one_door_each() {
 #[test]
 fn only_the_command_line_prints_and_knows_files_and_clocks() {
     let mut broken = Vec::new();
-    for source in sources().iter().filter(|s| s.room() != "cli") {
+    let inside = |s: &&Source| s.room() != "cli" && !AT_THE_DOOR.contains(&s.path.as_str());
+    for source in sources().iter().filter(inside) {
         let said = CLI_ONLY.iter().filter(|word| names(&source.code, word));
         broken.extend(said.map(|word| format!("{}: {word}", source.path)));
     }

@@ -1,7 +1,11 @@
 //! What can be said on the command line.
 
+use super::deps::{Deps, DepsFormat};
+use super::keep::Keeping;
 use super::messages::levels;
 use super::output::Failure;
+use super::shells::{Completions, Man};
+use super::watch::Watch;
 use crate::artifacts::Artifact;
 use crate::diag::Diagnostic;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -79,6 +83,10 @@ pub enum Command {
     Demo(Demo),
     /// Serve editors: the Language Server Protocol on standard input and output.
     Lsp(Lsp),
+    /// Print a script that completes commands and options in a shell.
+    Completions(Completions),
+    /// Write the manual pages.
+    Man(Man),
 }
 
 #[derive(Debug, Args)]
@@ -121,12 +129,15 @@ pub struct Compile {
     /// Write the outputs of these stages; the model itself only if it is among them or `-o` is given.
     #[arg(long, value_name = "STAGE,…", value_delimiter = ',', value_parser = stages())]
     pub emit: Vec<Artifact>,
-    /// Write what the outputs depend on, in the syntax of make.
-    #[arg(long, value_name = "FILE")]
-    pub deps: Option<PathBuf>,
-    /// Fail if the compiler would have to choose anything anew. Not available yet.
+    #[command(flatten)]
+    pub deps: Deps,
+    /// Fail if the compiler would have to choose anything that `NAME.lock.ron` beside the spec does not hold.
     #[arg(long)]
     pub locked: bool,
+    #[command(flatten)]
+    pub keeping: Keeping,
+    #[command(flatten)]
+    pub watch: Watch,
     #[command(flatten)]
     pub variant: Variant,
     #[command(flatten)]
@@ -143,6 +154,13 @@ pub struct Check {
     pub fix: bool,
     #[command(flatten)]
     pub variant: Variant,
+    /// Write this empty file if all is fine: something for a build tool to look at.
+    #[arg(long, value_name = "FILE")]
+    pub stamp: Option<PathBuf>,
+    #[command(flatten)]
+    pub deps: Deps,
+    #[command(flatten)]
+    pub watch: Watch,
 }
 
 #[derive(Debug, Args)]
@@ -345,6 +363,19 @@ fn assignment(text: &str) -> Result<(String, String), String> {
         return Err("expected NAME=VALUE".into());
     }
     Ok((name.trim().into(), value.trim().into()))
+}
+
+impl Check {
+    /// A rule of make is about a target, and what a check makes is its stamp.
+    pub fn refuse_rule_without_target(&self) -> Result<(), Failure> {
+        let is_rule = self.deps.file.is_some() && self.deps.format == DepsFormat::Make;
+        match is_rule && self.stamp.is_none() {
+            true => {
+                Err(Failure("a rule of make needs a target: give `--stamp FILE`, or another `--deps-format`".into()))
+            }
+            false => Ok(()),
+        }
+    }
 }
 
 impl Variant {

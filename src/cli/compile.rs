@@ -1,11 +1,14 @@
 //! `gonogo compile` and `gonogo check`.
 
-use super::args::{Check, Compile, Global, Variant};
+use super::args::{Check, Compile, Global, MessageFormat, Variant};
+use super::deps::Input;
 use super::messages::{self, Messages};
 use super::output::{self, DASH, Failure};
 use super::progress::Monitor;
-use super::{Exit, fix};
+use super::watch::Round;
+use super::{Exit, fix, keep};
 use crate::artifacts::Artifact;
+use crate::cache::folder::Counts;
 use crate::diag::Diagnostic;
 use crate::runtime::model::{Model, Rate};
 use crate::{Compiled, Options};
@@ -13,37 +16,85 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
-/// Compiles a spec and writes what was asked for, all of it or nothing.
+/// Compiles a spec and writes what was asked for, all of it or nothing; again and again if it is watched.
 pub fn compile(args: &Compile, global: &Global) -> Result<Exit, Failure> {
-    refuse_unavailable(args)?;
     let outputs = Outputs::of(args);
     output::probe(&outputs.model)?;
-    args.deps.iter().try_for_each(|deps| output::probe(deps))?;
-    let spec = Document::read(&args.spec)?;
+    args.deps.probe()?;
+    args.watch.run(std::slice::from_ref(&args.spec), || compile_once(args, &outputs, global))
+}
+
+fn compile_once(args: &Compile, outputs: &Outputs, global: &Global) -> Round {
+    let mut round = Round { exit: Ok(Exit::Fine), inputs: Vec::new(), summary: "not compiled".into() };
+    round.exit = Document::read(&args.spec).and_then(|spec| {
+        let compiled = compiled(args, outputs, &spec, global);
+        round.inputs = spec.inputs();
+        if args.locked {
+            round.inputs.extend(keep::lock_path(&args.spec).map(|path| Input::now(&path)));
+        }
+        let compiled = compiled?;
+        round.summary = count(&compiled.diagnostics);
+        if !report(&compiled, &args.variant, global)? {
+            args.deps.write_failed(&round.inputs)?;
+            return Ok(Exit::Faults);
+        }
+        let written = outputs.write(&compiled)?;
+        args.deps.write(&written, &round.inputs)?;
+        if let (Some(model), true) = (&compiled.model, outputs.model != Path::new(DASH)) {
+            summarise(model, &outputs.model)?;
+        }
+        Ok(Exit::Fine)
+    });
+    round
+}
+
+/// Compiles with the spec's lock and the cache, and locks what was chosen.
+fn compiled(args: &Compile, outputs: &Outputs, spec: &Document, global: &Global) -> Result<Compiled, Failure> {
+    let lock = keep::read_lock(&args.spec)?;
+    let cache = args.keeping.cache();
     let options = Options {
         station: args.station.clone(),
         set: args.variant.set.clone(),
         wanted: outputs.wanted.clone(),
+        cache: keep::shared(cache.as_ref()),
+        lock,
+        locked: args.locked,
         ..Options::default()
     };
-    let compiled = args.jobs.run(|| run(&spec, &options, global))?;
-    if !report(&compiled, &args.variant, global)? {
-        return Ok(Exit::Faults);
+    let compiled = args.jobs.run(|| run(spec, &options, global))?;
+    if let (Some(cache), true) = (cache, global.timings && global.message_format != MessageFormat::Json) {
+        let Counts { asked, found } = cache.counts();
+        output::remark(&format!("cache      {found} of {asked} found"));
     }
-    let written = outputs.write(&compiled)?;
-    if let Some(deps) = &args.deps {
-        output::write(deps, make_rule(&written, &compiled.inputs).as_bytes())?;
+    if !args.locked && !compiled.diagnostics.iter().any(Diagnostic::is_error) {
+        keep::write_lock(&args.spec, options.lock.as_ref(), compiled.lock.as_ref())?;
     }
-    if let (Some(model), true) = (&compiled.model, outputs.model != Path::new(DASH)) {
-        summarise(model, &outputs.model)?;
-    }
-    Ok(Exit::Fine)
+    Ok(compiled)
 }
 
-/// Checks specs up to the view, without rendering.
+/// Checks specs up to the view, without rendering; again and again if they are watched.
 pub fn check(args: &Check, global: &Global) -> Result<Exit, Failure> {
     fix::refuse_mixed_output(args, global)?;
+    args.refuse_rule_without_target()?;
+    args.deps.probe()?;
+    args.stamp.iter().try_for_each(|stamp| output::probe(stamp))?;
+    args.watch.run(&args.specs, || {
+        let mut round = Round { exit: Ok(Exit::Fine), inputs: Vec::new(), summary: String::new() };
+        let mut found = Vec::new();
+        round.exit = check_once(args, global, &mut round.inputs, &mut found);
+        round.summary = count(&found);
+        round
+    })
+}
+
+fn check_once(
+    args: &Check,
+    global: &Global,
+    inputs: &mut Vec<Input>,
+    found: &mut Vec<Diagnostic>,
+) -> Result<Exit, Failure> {
     let (mut exit, mut messages) = (Exit::Fine, Messages::new(global));
     for path in &args.specs {
         let spec = Document::read(path)?;
@@ -51,40 +102,83 @@ pub fn check(args: &Check, global: &Global) -> Result<Exit, Failure> {
             station: None,
             set: args.variant.set.clone(),
             wanted: BTreeSet::from([Artifact::View]),
+            lock: keep::read_lock(path)?,
             ..Options::default()
         };
         let spec = if args.fix { fix::mended(spec, path, &options)? } else { spec };
         let compiled = run(&spec, &options, global);
+        inputs.extend(spec.inputs());
         let diagnostics = args.variant.judged(&compiled.diagnostics);
         messages.add(&diagnostics, &compiled.sources)?;
         if diagnostics.iter().any(Diagnostic::is_error) {
             exit = Exit::Faults;
         }
+        found.extend(diagnostics);
     }
     messages.finish()?;
+    if exit != Exit::Fine {
+        args.deps.write_failed(inputs)?;
+        return Ok(exit);
+    }
+    args.stamp.iter().try_for_each(|stamp| output::write(stamp, b""))?;
+    args.deps.write(args.stamp.as_slice(), inputs)?;
     Ok(exit)
 }
 
-fn refuse_unavailable(args: &Compile) -> Result<(), Failure> {
-    if args.locked { Err(Failure("`--locked` is not available yet".into())) } else { Ok(()) }
+/// `2 errors, 1 warning`.
+fn count(diagnostics: &[Diagnostic]) -> String {
+    let errors = diagnostics.iter().filter(|d| d.is_error()).count();
+    let counted = |n: usize, word: &str| (n > 0).then(|| format!("{n} {word}{}", if n == 1 { "" } else { "s" }));
+    let counts = [counted(errors, "error"), counted(diagnostics.len() - errors, "warning")];
+    let counts: Vec<String> = counts.into_iter().flatten().collect();
+    if counts.is_empty() { "no faults".into() } else { counts.join(", ") }
 }
 
 /// A spec as read from a file or standard input.
 pub struct Document {
     pub name: String,
     pub text: String,
+    /// What was read for it, the spec itself first.
+    inputs: Mutex<Vec<Input>>,
 }
 
 impl Document {
     pub fn read(path: &Path) -> Result<Document, Failure> {
         let text = output::read_text(path)?;
-        let name = if path == Path::new(DASH) { "<stdin>".into() } else { path.display().to_string() };
-        Ok(Document { name, text })
+        let is_file = path != Path::new(DASH);
+        let name = if is_file { path.display().to_string() } else { "<stdin>".into() };
+        let own = Input { path: path.to_path_buf(), held: Some(blake3::hash(text.as_bytes())) };
+        Ok(Document { name, text, inputs: Mutex::new(if is_file { vec![own] } else { Vec::new() }) })
+    }
+
+    /// The same file with another text.
+    pub fn with_text(&self, text: String) -> Document {
+        let own = |input: &Input| input.path == Path::new(&self.name);
+        let held = Some(blake3::hash(text.as_bytes()));
+        let inputs = self.inputs().into_iter().filter(own).take(1).map(|input| Input { held, ..input }).collect();
+        Document { name: self.name.clone(), text, inputs: Mutex::new(inputs) }
     }
 
     /// The spec itself, or a file it uses.
     pub fn text_of(&self, name: &str) -> io::Result<String> {
-        if name == self.name { Ok(self.text.clone()) } else { fs::read_to_string(name) }
+        if name == self.name {
+            return Ok(self.text.clone());
+        }
+        let read = fs::read_to_string(name);
+        let input = match &read {
+            Ok(text) => Input { path: name.into(), held: Some(blake3::hash(text.as_bytes())) },
+            // Not there, or no text.
+            Err(_) => Input::now(Path::new(name)),
+        };
+        if let Ok(mut inputs) = self.inputs.lock() {
+            inputs.push(input);
+        }
+        read
+    }
+
+    /// The files that were read for it, and those that were looked for in vain.
+    pub fn inputs(&self) -> Vec<Input> {
+        self.inputs.lock().map(|inputs| inputs.clone()).unwrap_or_default()
     }
 }
 
@@ -103,7 +197,8 @@ pub fn watched(
     let compiled = work(&|name: &str| document.text_of(name), &|progress| monitor.note(progress));
     monitor.finish();
     if global.timings {
-        monitor.print_timings();
+        // A reader of standard output that has gone away shows when the rest is written.
+        let _ = monitor.print_timings(&document.name, global);
     }
     compiled
 }
@@ -169,14 +264,6 @@ fn default_name(spec: &Path, station: Option<&str>) -> PathBuf {
     PathBuf::from(format!("{stem}{station}.model.ron"))
 }
 
-/// `targets: inputs` as make reads it.
-fn make_rule(targets: &[PathBuf], inputs: &[String]) -> String {
-    let escaped = |name: &str| name.replace('$', "$$").replace(' ', "\\ ").replace('#', "\\#");
-    let targets: Vec<String> = targets.iter().map(|t| escaped(&t.display().to_string())).collect();
-    let inputs: Vec<String> = inputs.iter().map(|i| escaped(i)).collect();
-    format!("{}: {}\n", targets.join(" "), inputs.join(" "))
-}
-
 /// What the model promises, in a few lines.
 fn summarise(model: &Model, path: &Path) -> Result<(), Failure> {
     let promise = &model.promise;
@@ -213,11 +300,5 @@ mod tests {
         assert_eq!(beside("out/wheel.B.model.ron"), "out/wheel.B.view.ron");
         assert_eq!(beside("m.ron"), "m.view.ron");
         assert_eq!(beside("m"), "m.view.ron");
-    }
-
-    #[test]
-    fn make_rules_escape_what_make_would_read() {
-        let rule = make_rule(&["a b.ron".into()], &["x$y.gng".into(), "p#q.gng".into()]);
-        assert_eq!(rule, "a\\ b.ron: x$$y.gng p\\#q.gng\n");
     }
 }

@@ -65,7 +65,7 @@ impl Attempt {
         let first = chosen.first()?;
         for attempt in [chosen.as_slice(), std::slice::from_ref(first)] {
             let (text, made) = diag::apply(&self.spec.text, 0, attempt.iter().map(|(_, fix)| fix));
-            let spec = Document { name: self.spec.name.clone(), text };
+            let spec = self.spec.with_text(text);
             let compiled = compiled(&spec, options);
             if !made.is_empty() && faults(&compiled.diagnostics) <= faults(&self.compiled.diagnostics) {
                 let said = made.iter().map(|&i| self.said(&attempt[i])).collect();

@@ -5,6 +5,7 @@
 mod args;
 mod compile;
 mod demo;
+mod deps;
 mod diff;
 mod fix;
 mod font;
@@ -12,6 +13,7 @@ mod format;
 mod golden;
 mod import;
 mod judge;
+mod keep;
 mod lsp;
 mod messages;
 mod output;
@@ -24,7 +26,9 @@ pub mod report {
     pub use super::messages::{github, human, json, sarif, short};
 }
 mod report_page;
+mod shells;
 mod verdict;
+mod watch;
 
 use crate::diag;
 use args::{Cli, Command, Explain, Golden};
@@ -73,6 +77,8 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Import(args) => import::import(args, global),
         Command::Demo(args) => demo::demo(args, global),
         Command::Lsp(_) => lsp::lsp(),
+        Command::Completions(args) => shells::completions(args),
+        Command::Man(args) => shells::man(args),
     }
 }
 

@@ -3,7 +3,7 @@
 use super::args::{Global, Prove};
 use super::compile::{self, Document};
 use super::output::{self, Failure};
-use super::{Exit, judge};
+use super::{Exit, judge, keep};
 use crate::Options;
 use crate::runtime::model::{Promise, Rate};
 use crate::train::prove::{Proof, Trials};
@@ -13,8 +13,12 @@ use crate::train::stats::lower_95;
 pub fn prove(args: &Prove, global: &Global) -> Result<Exit, Failure> {
     let spec = Document::read(&args.spec)?;
     let model = judge::read_model(&args.model)?;
-    let options =
-        Options { station: Some(model.station.name.clone()), set: args.variant.set.clone(), ..Options::default() };
+    let options = Options {
+        station: Some(model.station.name.clone()),
+        set: args.variant.set.clone(),
+        lock: keep::read_lock(&args.spec)?,
+        ..Options::default()
+    };
     let trials = Trials { goods: args.goods, faults: args.faults, customers: args.customers };
     let work = || {
         compile::watched(&spec, global, |read, observer| {

@@ -3,7 +3,7 @@
 use super::args::{Global, Report};
 use super::compile::{self, Document};
 use super::output::{self, Failure};
-use super::{Exit, judge};
+use super::{Exit, judge, keep};
 use crate::report::{self, Assembly, Shot, Trained, View};
 use crate::runtime::calibrate::Calibration;
 use crate::runtime::inspect::{Inspector, Verdict};
@@ -23,7 +23,13 @@ pub fn report(args: &Report, global: &Global) -> Result<Exit, Failure> {
         _ => None,
     };
     let station = args.station.clone().or(model.as_ref().map(|m| m.station.name.clone()));
-    let options = Options { station, set: args.variant.set.clone(), keep: true, ..Options::default() };
+    let options = Options {
+        station,
+        set: args.variant.set.clone(),
+        keep: true,
+        lock: keep::read_lock(&args.spec)?,
+        ..Options::default()
+    };
     let compiled = args.jobs.run(|| compile::run(&spec, &options, global))?;
     let fine = compile::report(&compiled, &args.variant, global)?;
     if model.as_ref().is_some_and(|m| m.spec != compiled.made.digest) {

@@ -6,6 +6,7 @@
 mod assemble;
 mod beside;
 mod dimension;
+pub mod essence;
 mod family;
 mod feature;
 mod fields;

@@ -36,7 +36,7 @@ pub enum Decision {
 }
 
 /// A faulty component.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     pub component: String,
     /// `missing`, `not seated`, `misplaced` …
@@ -53,7 +53,7 @@ pub struct Finding {
 }
 
 /// One node of the object tree in this photo.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NodeReport {
     pub name: String,
     pub level: u32,
@@ -75,7 +75,7 @@ pub struct NodeReport {
     pub explained: bool,
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     pub decision: Decision,
     /// Why the photo cannot be inspected, or a summary of the findings; empty for go.

@@ -6,6 +6,7 @@
 
 mod edges;
 mod fit;
+mod kept;
 mod other_views;
 pub mod plan;
 pub mod prove;
@@ -17,6 +18,7 @@ pub mod verify;
 use crate::assembly::error_tree::ErrorTree;
 use crate::assembly::fault::ErrorMode;
 use crate::assembly::liaison::Liaison;
+use crate::cache::Cache;
 use crate::design::model::{Design, Response, Station};
 use crate::diag::Diagnostic;
 use crate::runtime::camera::Camera;
@@ -25,10 +27,13 @@ use crate::runtime::photo::Tone;
 use crate::runtime::pose::Pose;
 use crate::scene::build;
 use fit::Context;
-use other_views::Views;
+use kept::Kept;
+use other_views::{OtherView, Views};
 use plan::Plan;
 use rayon::prelude::*;
-use shots::{Drawn, Setup};
+use serde::{Deserialize, Serialize};
+use shots::Setup;
+use std::collections::BTreeMap;
 use synthesise::{Draws, Shots, synthesise};
 
 /// Customers imagined for the held-out renders.
@@ -55,6 +60,8 @@ pub struct Job<'a> {
     pub tree: &'a ErrorTree,
     /// Digest of the resolved spec.
     pub spec: String,
+    /// Where shots and what was learnt from them are kept for the next time.
+    pub cache: Option<&'a dyn Cache>,
 }
 
 /// Steps of training, for whoever wants to show them.
@@ -72,10 +79,39 @@ pub type Observer<'a> = dyn Fn(Step, usize, usize) + Sync + 'a;
 
 /// Trains a model.
 pub fn train(job: &Job, observer: &Observer) -> Result<(Model, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let kept = kept::learnt(job);
+    let is_new = kept.is_none();
+    let mut learnt = kept.map_or_else(|| learn(job, observer), Ok)?;
+    let mut model = learnt.model.clone();
+    (model.assembly, model.spec) = (job.design.name.clone(), job.spec.clone());
+    verify::settle(&mut model, job.design, &learnt.scenes, job.modes, &learnt.held_out);
+    let mut found = blind(job, &learnt.unseen);
+    found.extend(overlaps(job, &model));
+    let doubts = advised(job, found, &mut learnt.advice)?;
+    if is_new {
+        kept::keep_learnt(job, &learnt);
+    }
+    Ok((model, doubts))
+}
+
+/// All that takes time: what is left depends on the false rejects asked for and on names.
+#[derive(Serialize, Deserialize)]
+struct Learnt {
+    /// Modes that change next to nothing in the image.
+    unseen: Vec<usize>,
+    /// Per faulty scene the modes shown in it.
+    scenes: Vec<Vec<usize>>,
+    /// Without thresholds and promise.
+    model: Model,
+    held_out: verify::HeldOut,
+    /// By mode, where it would show better, as far as that was looked for.
+    advice: BTreeMap<usize, Option<OtherView>>,
+}
+
+fn learn(job: &Job, observer: &Observer) -> Result<Learnt, Vec<Diagnostic>> {
     observer(Step::Plan, 0, 1);
     let nominal = shots::nominal(job.design, job.station)?;
     let plan = plan::plan(job.design, &job.camera, &nominal, job.liaison, job.modes);
-    let mut doubts = doubts(job, &plan, &nominal);
     let images = job.design.train.images.max(2);
     let draws = Draws { seed: job.design.train.seed, count: images, faulty: images };
     let shots = render(job, &plan, &job.camera, draws, &|i, n| observer(Step::Render, i, n))?;
@@ -83,13 +119,15 @@ pub fn train(job: &Job, observer: &Observer) -> Result<(Model, Vec<Diagnostic>),
     let mut model = fit_model(job, &plan, &shots);
     let held_out = held_out(job, &plan, &model, observer)?;
     observer(Step::Verify, 0, 1);
-    verify::verify(&mut model, job.design, &plan, job.modes, &held_out);
-    doubts.extend(overlaps(job, &model, &nominal));
-    Ok((model, doubts))
+    let held_out = verify::judge_all(&mut model, job.design, &plan, job.modes, &held_out);
+    Ok(Learnt { unseen: plan.unseen, scenes: plan.scenes, model, held_out, advice: BTreeMap::new() })
 }
 
+/// A fault that the model does not, or hardly, show: its mode, what that means, and the warning.
+type Doubt = (usize, &'static str, Diagnostic);
+
 /// Components whose faults cannot be seen.
-fn doubts(job: &Job, plan: &Plan, nominal: &Drawn) -> Vec<Diagnostic> {
+fn blind(job: &Job, unseen: &[usize]) -> Vec<Doubt> {
     let blind = |&m: &usize| {
         let mode = &job.modes[m];
         let component = &job.design.components[mode.component];
@@ -97,38 +135,44 @@ fn doubts(job: &Job, plan: &Plan, nominal: &Drawn) -> Vec<Diagnostic> {
             format!("station `{}` cannot tell when `{}` is {}", job.station.name, component.name, mode.kind.word());
         Diagnostic::warning("W0602", component.span, message).label("nothing in the image changes")
     };
-    let found: Vec<(&ErrorMode, Diagnostic)> = plan.unseen.iter().map(|m| (&job.modes[*m], blind(m))).collect();
-    advised(job, nominal, found, "a go says nothing about this fault")
+    unseen.iter().map(|m| (*m, "a go says nothing about this fault", blind(m))).collect()
 }
 
 /// Faults that the model lets pass too often to rely on it.
-fn overlaps(job: &Job, model: &Model, nominal: &Drawn) -> Vec<Diagnostic> {
+fn overlaps(job: &Job, model: &Model) -> Vec<Doubt> {
     let weak = model.promise.modes.iter().filter(|m| f64::from(m.escape.events) > WEAK * f64::from(m.escape.trials));
     let doubt = |rate: &ModeRate| {
         let of =
-            |m: &&ErrorMode| job.design.components[m.component].name == rate.component && m.kind.word() == rate.fault;
-        let mode = job.modes.iter().find(of)?;
+            |m: &ErrorMode| job.design.components[m.component].name == rate.component && m.kind.word() == rate.fault;
+        let mode = job.modes.iter().position(of)?;
         let (escaped, trials) = (rate.escape.events, rate.escape.trials);
         let message =
             format!("station `{}` can hardly tell when `{}` is {}", job.station.name, rate.component, rate.fault);
-        let fault = Diagnostic::warning("W0703", job.design.components[mode.component].span, message)
+        let fault = Diagnostic::warning("W0703", job.design.components[job.modes[mode].component].span, message)
             .label(format!("{escaped} of {trials} synthetic photos with this fault pass"));
-        Some((mode, fault))
+        Some((mode, "a go says little about this fault", fault))
     };
-    advised(job, nominal, weak.filter_map(doubt).collect(), "a go says little about this fault")
+    weak.filter_map(doubt).collect()
 }
 
-/// With a note on where the fault would show, if there is such a place.
-fn advised(job: &Job, nominal: &Drawn, found: Vec<(&ErrorMode, Diagnostic)>, what: &str) -> Vec<Diagnostic> {
-    if found.is_empty() {
-        return Vec::new();
+/// With a note on where the fault would show, if there is such a place. What is not `known` yet is looked for.
+fn advised(
+    job: &Job,
+    found: Vec<Doubt>,
+    known: &mut BTreeMap<usize, Option<OtherView>>,
+) -> Result<Vec<Diagnostic>, Vec<Diagnostic>> {
+    if found.iter().any(|(mode, ..)| !known.contains_key(mode)) {
+        let nominal = shots::nominal(job.design, job.station)?;
+        let views = Views::new(job, &nominal);
+        for (mode, ..) in &found {
+            known.entry(*mode).or_insert_with(|| views.better(&job.modes[*mode]));
+        }
     }
-    let views = Views::new(job, nominal);
-    let advise = |(mode, doubt): (&ErrorMode, Diagnostic)| match views.better(mode) {
+    let advise = |(mode, what, doubt): Doubt| match known.get(&mode).copied().flatten() {
         Some(view) => doubt.note(format!("{what}: {}", view.advice())),
         None => doubt.note(format!("{what}; no view at this distance shows it much better: another light may")),
     };
-    found.into_iter().map(advise).collect()
+    Ok(found.into_iter().map(advise).collect())
 }
 
 /// Shots of all scenes of some draws by a camera.
@@ -146,10 +190,11 @@ fn render(
         samples: job.design.train.samples,
         blur: job.station.camera.blur.nominal / f64::from(plan.base),
     };
+    let kept = Kept::new(job, &setup, camera);
     let total = draws.shots(plan);
     let done = std::cell::Cell::new(0);
     progress(0, total);
-    synthesise(job.design, &setup, plan, job.modes, draws, &|| {
+    synthesise(job.design, &setup, plan, job.modes, draws, &kept, &|| {
         done.set(done.get() + 1);
         progress(done.get(), total);
     })

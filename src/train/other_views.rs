@@ -10,6 +10,7 @@ use crate::assembly::fault::ErrorMode;
 use crate::runtime::camera::Camera;
 use crate::scene::build::{self, Placed, bodies};
 use crate::view::item_buffer::ItemBuffer;
+use serde::{Deserialize, Serialize};
 
 /// Views that are tried (deg): elevations, and azimuths all round in steps.
 const ELEVATIONS: [f64; 4] = [30.0, 45.0, 60.0, 75.0];
@@ -22,7 +23,7 @@ const WORTHWHILE: f64 = 2.0;
 const LEAST_PIXELS: usize = 8;
 
 /// A view and what a fault in the middle of its sweep changes in it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OtherView {
     /// deg.
     pub elevation: f64,
@@ -125,6 +126,7 @@ mod tests {
             liaison: &found.liaison,
             tree: &tree,
             spec: String::new(),
+            cache: None,
         };
         let drawn = super::super::shots::nominal(&design, station).map_err(|_| ()).expect("a nominal draw");
         let views = Views::new(&job, &drawn);

@@ -65,7 +65,7 @@ pub fn prove(job: &Job, model: &Model, trials: Trials, observer: &Observer) -> R
         }
     }
     observer(Step::Verify, 0, 1);
-    let rates = verify::promise(model, job.design, &plan, job.modes, &judged, unfit);
+    let rates = verify::promise(model, job.design, &plan.scenes, job.modes, &judged, unfit);
     // The rates have a row for every mode whose component has a node.
     let name = |m: &usize| &job.design.components[job.modes[*m].component].name;
     let has_node = |m: &usize| model.nodes.iter().any(|n| n.name == *name(m));

@@ -18,6 +18,7 @@ use crate::runtime::model::{Lamp, ModeRate, Model, Promise};
 use crate::runtime::photo::Photo;
 use crate::runtime::pose::Installation;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Lamps of a customer's station give between these shares of the described power.
 const LAMP_POWERS: [f64; 2] = [0.3, 1.7];
@@ -101,6 +102,7 @@ pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, inde
 }
 
 /// One customer's photos, judged.
+#[derive(Serialize, Deserialize)]
 pub(super) struct Judged {
     /// How well the calibration photo was re-synthesised.
     correlation: f64,
@@ -109,19 +111,39 @@ pub(super) struct Judged {
     pub faulty: Vec<Vec<Verdict>>,
 }
 
-/// Judges the held-out shots of each customer and writes thresholds and promise into the model. The first good shot of
-/// each customer calibrates.
-pub fn verify(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], held_out: &[(Customer, Shots)]) {
+/// What the held-out shots of all customers were taken for.
+#[derive(Serialize, Deserialize)]
+pub struct HeldOut {
+    judged: Vec<Judged>,
+    /// Customers whose calibration photo was refused.
+    unfit: usize,
+}
+
+/// Judges the held-out shots of each customer, without thresholds yet. The first good shot of each customer calibrates.
+/// Takes from the model what cannot be told by it.
+pub fn judge_all(
+    model: &mut Model,
+    design: &Design,
+    plan: &Plan,
+    modes: &[ErrorMode],
+    held_out: &[(Customer, Shots)],
+) -> HeldOut {
     let all = |model: &Model| held_out.iter().filter_map(|(c, shots)| judge(model, plan, c, shots)).collect();
     let mut judged: Vec<Judged> = all(model);
     if forget_blind(model, design, plan, modes, &judged) {
         judged = all(model);
     }
     let unfit = held_out.len() - judged.len();
-    scores(model, design, plan, modes, &judged);
-    model.locator.accept = accept(&judged, model.locator.unsigned);
-    model.station.least_correlation = least_correlation(&judged);
-    model.promise = promise(model, design, plan, modes, &judged, unfit);
+    HeldOut { judged, unfit }
+}
+
+/// Writes thresholds and promise into the model.
+pub fn settle(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], held_out: &HeldOut) {
+    let HeldOut { judged, unfit } = held_out;
+    scores(model, design, scenes, modes, judged);
+    model.locator.accept = accept(judged, model.locator.unsigned);
+    model.station.least_correlation = least_correlation(judged);
+    model.promise = promise(model, design, scenes, modes, judged, *unfit);
 }
 
 /// `None` when the calibration photo does not do.
@@ -181,7 +203,7 @@ fn order(good: &[f64], fault: &[f64]) -> f64 {
 }
 
 /// Scores of every node on goods and on its own faults.
-fn scores(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], judged: &[Judged]) {
+fn scores(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], judged: &[Judged]) {
     let nodes = model.nodes.len();
     for (index, node) in model.nodes.iter_mut().enumerate() {
         let of = |verdict: &Verdict| verdict.nodes.get(index).map(|n| rounded(n.score));
@@ -190,7 +212,7 @@ fn scores(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorMode], 
         let sought = |kind: &str| node.hypotheses.iter().any(|h| h.fault == kind);
         let own = |m: &usize| design.components[modes[*m].component].name == node.name && sought(modes[*m].kind.word());
         let shown = |scene: &Vec<usize>| scene.iter().any(own);
-        let faulty = judged.iter().flat_map(|j| j.faulty.iter().zip(&plan.scenes));
+        let faulty = judged.iter().flat_map(|j| j.faulty.iter().zip(scenes));
         let mut fault: Vec<f64> =
             faulty.filter(|(_, scene)| shown(scene)).flat_map(|(verdicts, _)| verdicts).filter_map(of).collect();
         good.sort_by(f64::total_cmp);
@@ -245,7 +267,7 @@ fn accept(judged: &[Judged], unsigned: bool) -> f64 {
 pub(super) fn promise(
     model: &Model,
     design: &Design,
-    plan: &Plan,
+    scenes: &[Vec<usize>],
     modes: &[ErrorMode],
     judged: &[Judged],
     unfit: usize,
@@ -259,7 +281,7 @@ pub(super) fn promise(
     let false_rejects = goods.iter().filter(|v| rejected(v)).count() + unfit;
     let mut rates = Vec::new();
     let (mut escapes, mut trials) = (0, 0);
-    for (scene, shown) in plan.scenes.iter().enumerate() {
+    for (scene, shown) in scenes.iter().enumerate() {
         for &m in shown {
             let component = &design.components[modes[m].component].name;
             let Some(node) = model.nodes.iter().position(|n| &n.name == component) else { continue };

@@ -91,6 +91,16 @@ pub fn choose(design: &Design, station: &Station, bodies: &[Body], targets: &[Ta
         }
         CameraPlacing::Auto { distance, elevation, azimuth } => search.run([distance, elevation, azimuth]),
     };
+    chosen(design, station, bodies, table)
+}
+
+/// A choice made before: the view is scored and checked like a fixed one, and no other is tried.
+pub fn keep(design: &Design, station: &Station, bodies: &[Body], targets: &[Target], placing: Placed) -> Choice {
+    let search = Search::new(design, station, bodies, targets);
+    chosen(design, station, bodies, search.score_all(&[placing]))
+}
+
+fn chosen(design: &Design, station: &Station, bodies: &[Body], table: Vec<Scored>) -> Choice {
     let best = best(&table);
     let camera = build::camera(&station.camera, table[best].placing);
     let grid = PixelGrid::of(&camera);
@@ -261,7 +271,8 @@ fn unseen(design: &Design, station: &Station, table: &[Scored], seen: &[Seen]) -
 fn report(design: &Design, station: &Station, table: &[Scored], (watch, found): (usize, &Seen)) -> Diagnostic {
     let component = &design.components[found.component];
     let (name, visible, full) = (&component.name, found.visible_pixels, found.full_pixels);
-    let is_auto = matches!(station.camera.placing, CameraPlacing::Auto { .. });
+    // Of one view alone nothing can be said about the others.
+    let is_auto = matches!(station.camera.placing, CameraPlacing::Auto { .. }) && table.len() > 1;
     let most = table.iter().max_by_key(|scored| scored.watched[watch]);
     let elsewhere = most.filter(|scored| scored.watched[watch] >= LEAST_PIXELS);
     let subject = match (is_auto, elsewhere) {

@@ -5,6 +5,7 @@
 
 pub mod choose;
 pub mod item_buffer;
+pub mod lock;
 pub mod nodes;
 pub mod picture;
 mod raster;

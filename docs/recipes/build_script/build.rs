@@ -1,0 +1,4 @@
+fn main() -> Result<(), gonogo::build::Failed> {
+    gonogo::build::spec("specs/plate.gng").compile()?;
+    Ok(())
+}
