@@ -473,7 +473,7 @@ fn messages_that_make_no_sense_are_answered() {
         for method in METHODS {
             let params = json!({
                 "textDocument": { "uri": uri }, "position": far, "newName": "b", "options": { "tabSize": 4, "insertSpaces": true },
-                "context": { "includeDeclaration": true, "diagnostics": [], "triggerKind": 1 }, "range": { "start": far, "end": far },
+                "context": { "includeDeclaration": true, "diagnostics": [], "triggerKind": 1, "isRetrigger": false }, "range": { "start": far, "end": far },
             });
             let answer = editor.raw(method, params);
             assert!(answer.is_ok() || method == "textDocument/rename", "{method} {uri}: {answer:?}");
@@ -515,7 +515,7 @@ proptest::proptest! {
                 let params = json!({
                     "textDocument": { "uri": "file:///w/a.gng" }, "position": position, "newName": "other",
                     "options": { "tabSize": 4, "insertSpaces": true },
-                    "context": { "includeDeclaration": true, "diagnostics": [], "triggerKind": 1 },
+                    "context": { "includeDeclaration": true, "diagnostics": [], "triggerKind": 1, "isRetrigger": false },
                     "range": { "start": position, "end": position },
                 });
                 let answer = editor.raw(method, params);
