@@ -3,9 +3,11 @@
 //! A stage returns what it could make and a list of these. Nothing here prints; `cli` renders them.
 
 mod explain;
+mod fix;
 pub mod suggest;
 
 pub use explain::{codes, explain};
+pub use fix::{Applicability, Edit, Fix, apply};
 
 use serde::Serialize;
 
@@ -47,9 +49,11 @@ pub struct Diagnostic {
     pub severity: Severity,
     pub message: String,
     pub labels: Vec<Label>,
-    /// Text that mends the fault when pasted where the primary label points.
+    /// What to do about it, in words; the title of the first fix where there is one.
     pub help: Option<String>,
     pub notes: Vec<String>,
+    /// Changes of the text that mend it; the first is the most likely.
+    pub fixes: Vec<Fix>,
 }
 
 impl Diagnostic {
@@ -65,7 +69,7 @@ impl Diagnostic {
 
     fn new(code: &'static str, severity: Severity, span: Span, message: String) -> Self {
         let labels = vec![Label { span, text: String::new(), primary: true }];
-        Diagnostic { code, severity, message, labels, help: None, notes: Vec::new() }
+        Diagnostic { code, severity, message, labels, help: None, notes: Vec::new(), fixes: Vec::new() }
     }
 
     /// What the primary label says beside the source.
@@ -87,6 +91,23 @@ impl Diagnostic {
 
     pub fn note(mut self, text: impl Into<String>) -> Self {
         self.notes.push(text.into());
+        self
+    }
+
+    /// The one change that mends it: safe to make without asking.
+    pub fn fix(self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
+        self.with_fix(Fix::new(title, Applicability::MachineApplicable).edit(span, text))
+    }
+
+    /// A change that mends it if it is what was meant.
+    pub fn suggest(self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
+        self.with_fix(Fix::new(title, Applicability::MaybeIncorrect).edit(span, text))
+    }
+
+    /// Adds a fix; its title is the help unless something else was said.
+    pub fn with_fix(mut self, fix: Fix) -> Self {
+        self.help.get_or_insert_with(|| fix.title.clone());
+        self.fixes.push(fix);
         self
     }
 
