@@ -129,6 +129,7 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
 
     line.enter(Stage::Solid)?;
     let shapes = line.accept(line::shapes(&design))?;
+    line.check(((), line::idle_cuts(&design, &shapes)));
     let solids = line::per_component(&design, &shapes);
     line.keep(|made| made.solids = solids.clone());
     line.emit(Artifact::Brep, || artifacts::brep(&design, &shapes));

@@ -9,7 +9,7 @@ use crate::assembly::liaison::Liaison;
 use crate::assembly::piece::Workshop;
 use crate::assembly::place::place;
 use crate::design::Loaded;
-use crate::design::model::{Design, Part, Station};
+use crate::design::model::{Design, Feature, Op, Part, Station};
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Sources};
 use crate::runtime::camera::Camera;
@@ -265,7 +265,12 @@ pub(crate) fn shapes(design: &Design) -> Result<Vec<[Arc<Solid>; 3]>, Vec<Diagno
                 }
                 shapes.push(solids);
             }
-            Err(found) => faults.extend(found),
+            // Pieces of one part have its faults in common.
+            Err(found) => found.into_iter().for_each(|fault| {
+                if !faults.contains(&fault) {
+                    faults.push(fault);
+                }
+            }),
         }
     }
     if faults.is_empty() { Ok(shapes) } else { Err(faults) }
@@ -278,7 +283,58 @@ fn at_limits(
 ) -> Result<[Arc<Solid>; 3], Vec<Diagnostic>> {
     let quality = Quality::default();
     let mut at = |values: &[f64]| workshop.solid(part, values, &quality);
-    Ok([at(nominal)?, at(mmc)?, at(lmc)?])
+    let limit = |faults: Vec<Diagnostic>, name: &str| -> Vec<Diagnostic> {
+        faults.into_iter().map(|fault| fault.note(format!("at {name}, not at nominal"))).collect()
+    };
+    Ok([at(nominal)?, at(mmc).map_err(|f| limit(f, "MMC"))?, at(lmc).map_err(|f| limit(f, "LMC"))?])
+}
+
+/// W0402: cuts that take nothing away. A cut that leaves no face is tried without, as long as there are few of them.
+pub(crate) fn idle_cuts(design: &Design, shapes: &[[Arc<Solid>; 3]]) -> Vec<Diagnostic> {
+    /// Parts that are made once more, at most.
+    const TRIALS: usize = 20;
+    let (nominal, mut trials) = (design.nominal(), 0);
+    let (mut seen, mut found) = (BTreeSet::new(), Vec::new());
+    for (part, [solid, ..]) in design.parts.iter().zip(shapes).filter(|(part, _)| seen.insert(&part.name)) {
+        let shown: BTreeSet<&str> = solid.faces.iter().filter_map(|f| f.name.split('.').next()).collect();
+        for (i, feature) in part.features.iter().enumerate().filter(|(_, f)| f.op == Op::Cut) {
+            let name = |copy: usize| match feature.patterned {
+                true => format!("{}[{}]", feature.name, copy + 1),
+                false => feature.name.clone(),
+            };
+            let mut idle = |copy: &usize| {
+                let suspect = !shown.contains(name(*copy).as_str()) && trials < TRIALS;
+                trials += usize::from(suspect);
+                suspect && is_idle(part, i, *copy, &nominal, solid.volume)
+            };
+            let names: Vec<String> = (0..feature.copies.len()).filter(|copy| idle(copy)).map(name).collect();
+            found.extend(takes_nothing(part, feature, &names));
+        }
+    }
+    found
+}
+
+/// Whether a part is the same without one copy of a cut.
+fn is_idle(part: &Part, feature: usize, copy: usize, nominal: &[f64], volume: f64) -> bool {
+    /// Of the volume: below it is rounding.
+    const NOTHING: f64 = 1e-9;
+    let mut without = part.clone();
+    without.features[feature].copies.remove(copy);
+    if without.features[feature].copies.is_empty() {
+        without.features.remove(feature);
+    }
+    let solid = crate::solid::evaluate(&without, nominal, &Quality::default());
+    solid.is_ok_and(|solid| (solid.volume - volume).abs() <= NOTHING * volume)
+}
+
+fn takes_nothing(part: &Part, feature: &Feature, copies: &[String]) -> Option<Diagnostic> {
+    let (first, others) = copies.split_first()?;
+    let message = match others.len() {
+        0 => format!("`{first}` takes nothing from `{}`", part.name),
+        n => format!("`{first}` and {n} more of `{}` take nothing from `{}`", feature.name, part.name),
+    };
+    let warning = Diagnostic::warning("W0402", feature.span, message).label("meets no material at nominal");
+    Some(warning.help("check where it stands, or remove it"))
 }
 
 /// E0403: which face comes or goes within tolerance.

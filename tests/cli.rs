@@ -171,6 +171,85 @@ fn diagnostics_can_be_json_lines_or_annotations() {
 // --- Compiling -------------------------------------------------------------------------------------------------------
 
 #[test]
+fn sarif_is_one_log_for_all_specs() {
+    let folder = Folder::new("sarif");
+    folder.file("good.gng", spec()).file("a.gng", spec().replace("root plate", "root plat"));
+    folder.file("b.gng", spec().replace("6 +0.012/0", "6 +0/+0.012"));
+    let run = folder.run(&["check", "good.gng", "a.gng", "b.gng", "--message-format", "sarif"]);
+    run.expect(1, &[]);
+    let log: serde_json::Value = serde_json::from_str(&run.out).unwrap();
+    let uri = |i: usize| &log["runs"][0]["results"][i]["locations"][0]["physicalLocation"]["artifactLocation"]["uri"];
+    assert_eq!((uri(0), uri(1)), (&"a.gng".into(), &"b.gng".into()), "{}", run.out);
+    let nothing = folder.run(&["check", "good.gng", "--message-format", "sarif"]);
+    nothing.expect(0, &["\"results\": []"]);
+}
+
+#[test]
+fn warnings_can_be_denied_and_allowed_by_code() {
+    let folder = Folder::new("levels");
+    folder.file("plate.gng", spec().replace("d = 6 -0.004/-0.012", "d = 6 H7"));
+    let check = |more: &[&str]| folder.run(&[&["check", "plate.gng"], more].concat());
+    check(&[]).expect(0, &["warning[W0304]"]);
+    check(&["-D", "warnings"]).expect(1, &["error[W0304]"]);
+    check(&["-D", "W0304"]).expect(1, &["error[W0304]"]);
+    check(&["-D", "W0310"]).expect(0, &["warning[W0304]"]);
+    let allowed = check(&["-D", "warnings", "--allow", "W0304", "--allow", "W0502"]);
+    assert_eq!(allowed.expect(0, &[]).err, "");
+    check(&["--allow", "W0340"]).expect(2, &["did you mean `W0304`?"]);
+    check(&["-D", "E0305"]).expect(2, &["only warnings"]);
+    folder.run(&["compile", "plate.gng", "-D", "W0304"]).expect(1, &["error[W0304]"]);
+    assert_eq!(folder.names(), ["plate.gng"]);
+}
+
+#[test]
+fn fixes_are_made_until_none_is_left() {
+    let folder = Folder::new("fixed");
+    let broken =
+        spec().replace("gonogo 1\n", "").replace("h = through)", "h = through").replace("40 ±0.1", "40,5 ±0,1");
+    folder
+        .file("plate.gng", broken.replace("z = 0 ±0.05", "z = 0 ±0.05;").replace("6 +0.012/0", "6 +0.012 0"))
+        .file("other.gng", "gonogo 1;\n");
+    let run = folder.run(&["check", "--fix", "plate.gng"]);
+    let made = ["mended E0105", "mended E0101: write `40.5 ±0.1`", "a `)` is missing", "remove the `;`"];
+    run.expect(1, &made);
+    // What could mean several things is left to people.
+    assert_eq!(folder.read("plate.gng"), spec().replace("40 ±0.1", "40.5 ±0.1").replace("6 +0.012/0", "6 +0.012 0"));
+    assert_eq!((folder.read("other.gng").as_str(), folder.names().len()), ("gonogo 1;\n", 2));
+    let good = folder.file("good.gng", spec()).run(&["check", "--fix", "good.gng"]);
+    assert_eq!(good.expect(0, &[]).err, "");
+}
+
+#[test]
+fn fixes_of_standard_input_go_to_standard_output() {
+    let folder = Folder::new("fixed_input");
+    let run = folder.run_with(&["check", "--fix", "-"], &spec().replace("root plate", "root plate;"));
+    assert_eq!(run.expect(0, &["<stdin>:30:15: mended E0101: remove the `;`"]).out, spec());
+    let mixed = folder.run_with(&["check", "--fix", "-", "--message-format", "json"], &spec());
+    mixed.expect(2, &["standard output"]);
+}
+
+#[test]
+fn fixes_stay_in_the_files_that_are_named() {
+    let folder = Folder::new("fixed_use");
+    let (head, rest) = spec().split_once("part pin").map(|(h, r)| (h.to_string(), format!("part pin{r}"))).unwrap();
+    let used = head.replace("z = 4 ±0.05)", "z = 4 ±0.05))");
+    folder.file("used.gng", &used).file("top.gng", format!("gonogo 1\nuse \"used.gng\"\n{rest}"));
+    folder.run(&["check", "--fix", "top.gng"]).expect(1, &["this `)` closes nothing"]);
+    assert_eq!(folder.read("used.gng"), used);
+    folder.run(&["check", "--fix", "top.gng", "used.gng"]).expect(1, &["used.gng:20:", "mended E0101: remove it"]);
+    assert_eq!(folder.read("used.gng"), head);
+}
+
+#[test]
+fn every_code_is_listed_and_a_wrong_one_is_answered_with_the_nearest() {
+    let folder = Folder::new("explain");
+    folder.run(&["explain"]).expect(0, &["E0305  ", "W0502  "]);
+    folder.run(&["explain", "e0305"]).expect(0, &["# E0305: "]);
+    folder.run(&["explain", "E0350"]).expect(2, &["there is no diagnostic `E0350`; did you mean `E0305`?"]);
+    folder.run(&["explain", "nonsense"]).expect(2, &["`gonogo explain` lists all"]);
+}
+
+#[test]
 fn the_same_spec_gives_the_same_bytes_at_any_number_of_threads() {
     let folder = Folder::new("threads");
     folder.file("plate.gng", spec());
@@ -240,7 +319,6 @@ fn what_is_not_there_yet_says_so() {
     let folder = Folder::new("not_yet");
     folder.file("plate.gng", spec());
     folder.run(&["compile", "plate.gng", "--locked"]).expect(2, &["not available yet"]);
-    folder.run(&["check", "plate.gng", "--message-format", "sarif"]).expect(2, &["not available yet"]);
 }
 
 #[test]
@@ -272,6 +350,20 @@ fn fmt_lays_out_in_place_and_check_only_tells() {
     assert_eq!((run.code, run.out), (0, tidy));
     folder.run_with(&["fmt", "-"], "part {").expect(1, &["E01"]);
     assert_eq!(folder.names(), ["a.gng"]);
+}
+
+#[test]
+fn fmt_shows_what_it_would_change() {
+    let folder = Folder::new("fmt_diff");
+    folder.file("good.gng", spec()).file("bad.gng", spec().replace("    root plate", "  root   plate"));
+    let run = folder.run(&["fmt", "--diff", "good.gng", "bad.gng"]);
+    run.expect(1, &["--- bad.gng\n+++ bad.gng\n@@ ", "\n-  root   plate\n+    root plate\n"]);
+    assert!(!run.out.contains("good.gng") && !run.out.contains('\x1b'), "{}", run.out);
+    assert!(folder.read("bad.gng").contains("  root   plate"));
+    assert_eq!(folder.run(&["fmt", "--diff", "good.gng"]).expect(0, &[]).out, "");
+    folder.run(&["fmt", "--diff", "--color", "always", "bad.gng"]).expect(1, &["\x1b[31m-  root"]);
+    let input = folder.run_with(&["fmt", "--diff", "-"], &spec().replace("    root plate", " root plate"));
+    input.expect(1, &["--- -\n", "+    root plate"]);
 }
 
 #[test]
@@ -370,7 +462,8 @@ fn json_has_one_object_a_line_whatever_the_photo_is_like() {
 fn junit_is_one_report_for_all() {
     let run = inspect(&["good.png", "missing.png", "rubbish.png"], &["--format", "junit"]);
     assert!(run.out.starts_with("<?xml") && run.out.trim_end().ends_with("</testsuites>"), "{}", run.out);
-    run.expect(2, &[r#"tests="3" failures="1" errors="1""#]);
+    run.expect(2, &[r#"tests="6" failures="1" errors="2""#]);
+    run.expect(2, &[r#"<testcase classname="good.png" name="pin[1]"/>"#, r#"name="pin[1]"><failure type="no-go""#]);
 }
 
 #[test]

@@ -12,8 +12,8 @@ use super::place::place;
 use super::sides::{Joint, Side, moved};
 use super::stack::{Effect, Spread, Stack};
 use crate::design::model::{Design, FacePath, Measure, Values};
-use crate::diag::Diagnostic;
 use crate::diag::suggest::nearest;
+use crate::diag::{Diagnostic, Span};
 use crate::solid::{Solid, Surface};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::Serialize;
@@ -311,17 +311,18 @@ fn middle(solid: &Solid, name: &str) -> Point3<f64> {
 fn no_face(part: &str, solid: &Solid, path: &FacePath) -> Diagnostic {
     let message = format!("part `{part}` shows no face `{}`", path.face);
     let fault = Diagnostic::error("E0509", path.span, message).label("no such face");
+    let face = Span { start: path.span.end.saturating_sub(path.face.len() as u32), ..path.span };
     let names = || solid.faces.iter().map(|f| f.name.as_str());
     let feature = path.face.rsplit_once('.').map_or(path.face.as_str(), |(feature, _)| feature);
     let own: Vec<&str> = names().filter(|n| n.rsplit_once('.').is_some_and(|(f, _)| f == feature)).collect();
     if own.is_empty() {
         return match nearest(&path.face, names()) {
-            Some(near) => fault.help(format!("did you mean `{near}`?")),
+            Some(near) => fault.meant(face, near),
             None => fault.note(format!("no face of `{feature}` is left: other features took them all")),
         };
     }
     match nearest(&path.face, own.iter().copied()) {
-        Some(near) => fault.help(format!("did you mean `{near}`?")),
+        Some(near) => fault.meant(face, near),
         None => fault.help(format!("faces of `{feature}`: {}", own.join(", "))),
     }
 }

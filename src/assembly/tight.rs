@@ -9,7 +9,7 @@ use super::contact::{Contact, ContactKind, Tight};
 use super::liaison::Liaison;
 use super::play::Share;
 use crate::design::model::{Design, DimId, Expr};
-use crate::diag::Diagnostic;
+use crate::diag::{Diagnostic, Span};
 use crate::solid::Solid;
 use crate::units::Quantity;
 use std::collections::BTreeMap;
@@ -111,7 +111,8 @@ impl Case<'_> {
             None => warning,
         };
         match self.cure(design) {
-            Some(help) => warning.help(help),
+            Some((help, Some((span, text)))) => warning.suggest(help, span, text),
+            Some((help, None)) => warning.help(help),
             None => warning,
         }
     }
@@ -136,26 +137,47 @@ impl Case<'_> {
         (named.len() > 1).then(|| named.join(", "))
     }
 
-    /// The limit that alone leaves no interference: of a placement if one will do, else of a size.
-    fn cure(&self, design: &Design) -> Option<String> {
+    /// The limit that alone leaves no interference: of a placement if one will do, with its text, else of a size.
+    fn cure(&self, design: &Design) -> Option<(String, Option<(Span, String)>)> {
         let placed = |s: &&Share| self.axes.contains_key(&s.dim);
         let zone = self.shares.iter().filter(placed).find(|s| s.loss > self.missing + SAME);
         let size = || self.shares.iter().filter(|s| !placed(s)).find(|s| s.loss > self.missing - SAME);
         let share = zone.or_else(size)?;
-        let kept = (1.0 - self.missing / share.loss).max(0.0);
         let dim = &design.dims[share.dim.0 as usize];
         let axis = self.axes.get(&share.dim).map(|(_, axis)| *axis);
         let turns = dim.quantity == Quantity::Angle || axis.is_some_and(|a| a >= 3);
+        let mut kept = (1.0 - self.missing / share.loss).max(0.0);
+        if share.sideways && !turns {
+            kept = kept.min(self.kept_across(share, (share.at - dim.range.nominal).abs()));
+        }
         let (scale, unit) = if turns { (1f64.to_degrees(), " deg") } else { (1.0, "") };
         let room = (share.at - dim.range.nominal) * kept * scale;
         let nominal = (dim.range.nominal * scale * 1e6).round() / 1e6 + 0.0;
         if let Some(axis) = axis {
-            return Some(format!("{} = {nominal} ±{}{unit}", AXES[axis], rounded_down(room.abs())));
+            let room = rounded_down(room.abs());
+            let help = format!("{} = {nominal} ±{room}{unit}", AXES[axis]);
+            // In whatever units the file is written.
+            let unit = if turns { "deg" } else { "mm" };
+            return Some((help, Some((dim.span, format!("{nominal} {unit} ±{room} {unit}")))));
         }
         let limit = nominal + rounded_down(room.abs()).parse::<f64>().unwrap_or(0.0) * room.signum();
         let limit = (limit * 1e6).round() / 1e6;
         let word = if share.at > dim.range.nominal { "at most" } else { "at least" };
-        Some(format!("`{}` {word} {limit}{unit}", dim.name))
+        Some((format!("`{}` {word} {limit}{unit}", dim.name), None))
+    }
+}
+
+impl Case<'_> {
+    /// The share of `reach` (mm) that a zone may keep where zones across each other add up as the sides of a right angle,
+    /// so that each loses less than it is wide.
+    fn kept_across(&self, share: &Share, reach: f64) -> f64 {
+        if share.loss > reach * (1.0 - SAME) {
+            return 1.0;
+        }
+        let all: f64 = self.shares.iter().filter(|s| s.sideways).map(|s| s.loss).sum();
+        let others = all * all - reach * reach;
+        let left = (all - self.missing).max(0.0);
+        (left * left - others).max(0.0).sqrt() / reach
     }
 }
 

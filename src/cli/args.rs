@@ -1,7 +1,9 @@
 //! What can be said on the command line.
 
+use super::messages::levels;
 use super::output::Failure;
 use crate::artifacts::Artifact;
+use crate::diag::Diagnostic;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -46,7 +48,7 @@ pub enum MessageFormat {
     Json,
     /// Annotations of GitHub Actions.
     Github,
-    /// Not available yet.
+    /// One SARIF 2.1.0 log, for code scanners.
     Sarif,
 }
 
@@ -80,9 +82,12 @@ pub struct Variant {
     /// Replace the value of a `let`; later wins.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, action = ArgAction::Append)]
     pub set: Vec<(String, String)>,
-    /// Treat a class of diagnostics as errors: `-D warnings`.
-    #[arg(short = 'D', long = "deny", value_name = "CLASS", value_parser = ["warnings"], action = ArgAction::Append)]
+    /// Treat a warning as an error: `-D W0304`, or `-D warnings` for all.
+    #[arg(short = 'D', long = "deny", value_name = "CODE", value_parser = levels::denied, action = ArgAction::Append)]
     pub deny: Vec<String>,
+    /// Leave a warning out: `--allow W0310`, also under `-D warnings`.
+    #[arg(long, value_name = "CODE", value_parser = levels::warning, action = ArgAction::Append)]
+    pub allow: Vec<String>,
 }
 
 #[derive(Debug, Args)]
@@ -122,6 +127,9 @@ pub struct Check {
     /// The specs, or `-` for standard input.
     #[arg(required = true)]
     pub specs: Vec<PathBuf>,
+    /// Mend in these specs what can mean only one thing, then check what is left; `-` goes to standard output.
+    #[arg(long)]
+    pub fix: bool,
     #[command(flatten)]
     pub variant: Variant,
 }
@@ -131,6 +139,9 @@ pub struct Fmt {
     /// Change nothing; exit with 1 if a spec is laid out otherwise.
     #[arg(long)]
     pub check: bool,
+    /// Change nothing; show what would change, exit with 1 if anything would.
+    #[arg(long)]
+    pub diff: bool,
     /// The specs, or `-` for standard input to standard output.
     #[arg(required = true)]
     pub specs: Vec<PathBuf>,
@@ -178,7 +189,7 @@ pub enum VerdictFormat {
     Human,
     /// One JSON object a line and photo.
     Json,
-    /// One test case a photo.
+    /// One report: a suite a photo, a test case a watched component.
     Junit,
 }
 
@@ -231,8 +242,8 @@ pub struct Prove {
 
 #[derive(Debug, Args)]
 pub struct Explain {
-    /// `E0305`
-    pub code: String,
+    /// `E0305`; all codes unless given.
+    pub code: Option<String>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -314,8 +325,9 @@ fn assignment(text: &str) -> Result<(String, String), String> {
 }
 
 impl Variant {
-    pub fn denies_warnings(&self) -> bool {
-        !self.deny.is_empty()
+    /// The diagnostics with allowed warnings left out and denied ones as errors.
+    pub fn judged(&self, diagnostics: &[Diagnostic]) -> Vec<Diagnostic> {
+        levels::applied(diagnostics, &self.deny, &self.allow)
     }
 }
 

@@ -1,11 +1,12 @@
 //! `gonogo compile` and `gonogo check`.
 
 use super::args::{Check, Compile, Global, Variant};
+use super::messages::{self, Messages};
 use super::output::{self, DASH, Failure};
 use super::progress::Monitor;
-use super::{Exit, messages};
+use super::{Exit, fix};
 use crate::artifacts::Artifact;
-use crate::diag::Severity;
+use crate::diag::Diagnostic;
 use crate::runtime::model::{Model, Rate};
 use crate::{Compiled, Options};
 use std::collections::BTreeSet;
@@ -42,7 +43,8 @@ pub fn compile(args: &Compile, global: &Global) -> Result<Exit, Failure> {
 
 /// Checks specs up to the view, without rendering.
 pub fn check(args: &Check, global: &Global) -> Result<Exit, Failure> {
-    let mut exit = Exit::Fine;
+    fix::refuse_mixed_output(args, global)?;
+    let (mut exit, mut messages) = (Exit::Fine, Messages::new(global));
     for path in &args.specs {
         let spec = Document::read(path)?;
         let options = Options {
@@ -51,11 +53,15 @@ pub fn check(args: &Check, global: &Global) -> Result<Exit, Failure> {
             wanted: BTreeSet::from([Artifact::View]),
             keep: false,
         };
+        let spec = if args.fix { fix::mended(spec, path, &options)? } else { spec };
         let compiled = run(&spec, &options, global);
-        if !report(&compiled, &args.variant, global)? {
+        let diagnostics = args.variant.judged(&compiled.diagnostics);
+        messages.add(&diagnostics, &compiled.sources)?;
+        if diagnostics.iter().any(Diagnostic::is_error) {
             exit = Exit::Faults;
         }
     }
+    messages.finish()?;
     Ok(exit)
 }
 
@@ -66,7 +72,7 @@ fn refuse_unavailable(args: &Compile) -> Result<(), Failure> {
 /// A spec as read from a file or standard input.
 pub struct Document {
     pub name: String,
-    text: String,
+    pub text: String,
 }
 
 impl Document {
@@ -77,7 +83,7 @@ impl Document {
     }
 
     /// The spec itself, or a file it uses.
-    fn text_of(&self, name: &str) -> io::Result<String> {
+    pub fn text_of(&self, name: &str) -> io::Result<String> {
         if name == self.name { Ok(self.text.clone()) } else { fs::read_to_string(name) }
     }
 }
@@ -104,9 +110,9 @@ pub fn watched(
 
 /// Prints the diagnostics; whether they allow going on.
 pub fn report(compiled: &Compiled, variant: &Variant, global: &Global) -> Result<bool, Failure> {
-    messages::print(&compiled.diagnostics, &compiled.sources, global)?;
-    let stops = |severity| severity == Severity::Error || variant.denies_warnings();
-    Ok(!compiled.diagnostics.iter().any(|d| stops(d.severity)))
+    let diagnostics = variant.judged(&compiled.diagnostics);
+    messages::print(&diagnostics, &compiled.sources, global)?;
+    Ok(!diagnostics.iter().any(Diagnostic::is_error))
 }
 
 /// Where things go.

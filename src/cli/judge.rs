@@ -61,7 +61,8 @@ pub fn inspect(args: &Inspect) -> Result<Exit, Failure> {
         watch.run(&end, |path, bytes, patient| desk.take_if_complete(path, bytes, patient))?;
     }
     if args.format == VerdictFormat::Junit {
-        output::line(&verdict::junit(&format!("{}.{}", model.assembly, model.station.name), &desk.outcomes))?;
+        let name = format!("{}.{}", model.assembly, model.station.name);
+        output::line(&verdict::junit(&name, &verdict::watched(&model), &desk.outcomes))?;
     }
     Ok(desk.worst.unwrap_or(Exit::Trouble))
 }

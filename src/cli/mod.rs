@@ -5,6 +5,8 @@
 mod args;
 mod compile;
 mod demo;
+mod diff;
+mod fix;
 mod font;
 mod format;
 mod golden;
@@ -15,10 +17,14 @@ mod overlay;
 mod photos;
 mod progress;
 mod prove;
-pub mod report;
+/// The formats by the name they were first known under.
+pub mod report {
+    pub use super::messages::{github, human, json, sarif, short};
+}
 mod report_page;
 mod verdict;
 
+use crate::diag;
 use args::{Cli, Command, Explain, Golden};
 use clap::Parser;
 use output::Failure;
@@ -51,7 +57,6 @@ pub fn main() -> ExitCode {
 
 fn run(cli: &Cli) -> Result<Exit, Failure> {
     let global = &cli.global;
-    messages::refuse_unavailable(global)?;
     match &cli.command {
         Command::Compile(args) => compile::compile(args, global),
         Command::Check(args) => compile::check(args, global),
@@ -67,10 +72,19 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
     }
 }
 
-/// Prints the page of a diagnostic.
+/// Prints the page of a diagnostic, or all codes by one line each.
 fn explain(args: &Explain) -> Result<Exit, Failure> {
-    let Some(page) = crate::diag::explain(&args.code.to_ascii_uppercase()) else {
-        return Err(Failure(format!("there is no diagnostic `{}`", args.code)));
+    let Some(code) = args.code.as_ref().map(|code| code.to_ascii_uppercase()) else {
+        diag::codes()
+            .try_for_each(|code| output::line(&format!("{code}  {}", diag::title(code).unwrap_or_default())))?;
+        return Ok(Exit::Fine);
+    };
+    let Some(page) = diag::explain(&code) else {
+        let near = match diag::suggest::nearest(&code, diag::codes()) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => "`gonogo explain` lists all".to_string(),
+        };
+        return Err(Failure(format!("there is no diagnostic `{}`; {near}", args.code.as_deref().unwrap_or_default())));
     };
     output::line(page.trim_end())?;
     Ok(Exit::Fine)

@@ -42,7 +42,16 @@ pub fn read_all(from: impl Read) -> io::Result<Vec<u8>> {
 /// The text of a file, or of standard input for `-`.
 pub fn read_text(path: &Path) -> Result<String, Failure> {
     let bytes = read(path)?;
-    String::from_utf8(bytes).map_err(|_| Failure(format!("`{}` is not UTF-8 text", path.display())))
+    String::from_utf8(bytes).map_err(|e| {
+        let valid = e.utf8_error().valid_up_to();
+        let bytes = e.as_bytes();
+        let line = 1 + bytes[..valid].iter().filter(|&&b| b == b'\n').count();
+        let what = match bytes {
+            [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "is UTF-16 text".to_string(),
+            _ => format!("is not UTF-8 text: see line {line}"),
+        };
+        Failure(format!("`{}` {what}; save it as UTF-8", path.display()))
+    })
 }
 
 /// Fails now if `path` could not be written later, so that nobody waits for a result that cannot be kept.

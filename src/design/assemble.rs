@@ -50,6 +50,7 @@ impl Resolver {
         let mut built = Assembled::default();
         let places: Vec<&ast::Place> = body.lines.iter().filter_map(as_place).collect();
         let counts = pieces(body);
+        self.written = body.lines.iter().filter_map(component_name).map(|name| name.text.clone()).collect();
         self.root(body, span, catalogue, &counts, &mut built);
         if built.components.is_empty() {
             return built;
@@ -103,11 +104,7 @@ impl Resolver {
     fn unique_names(&mut self, body: &ast::Body) {
         let mut seen: BTreeMap<&str, Span> = BTreeMap::new();
         for line in &body.lines {
-            let name = match &line.stmt {
-                Stmt::Place(place) => &place.name,
-                Stmt::Root { name, .. } => name,
-                _ => continue,
-            };
+            let Some(name) = component_name(line) else { continue };
             match seen.get(name.text.as_str()) {
                 Some(first) if matches!(line.stmt, Stmt::Place(_)) => {
                     let first = *first;
@@ -180,7 +177,7 @@ impl Resolver {
         };
         let names = catalogue.parts.keys().copied();
         self.report(match nearest(&wanted.text, names.clone()) {
-            Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+            Some(near) => diagnostic.meant(wanted.span, near),
             None => diagnostic.help(format!("parts: {}", names.collect::<Vec<_>>().join(", "))),
         });
     }
@@ -199,26 +196,29 @@ impl Resolver {
         } else {
             format!("write `place {} = {seats}x {part} on {target}`", place.name.text)
         };
-        self.report(
-            Diagnostic::error("E0505", span, message)
-                .label("counts differ")
-                .also(place.on.span, copies(seats))
-                .help(help),
-        );
+        let fault = Diagnostic::error("E0505", span, message).label("counts differ").also(place.on.span, copies(seats));
+        self.report(match (&place.count, &place.part) {
+            (Some(count), _) => fault.suggest(help, count.span, format!("{seats}x")),
+            (None, Some(part)) => fault.suggest(help, Span { end: part.span.start, ..part.span }, format!("{seats}x ")),
+            (None, None) => {
+                let name = &place.name;
+                fault.suggest(help, Span { start: name.span.end, ..name.span }, format!(" = {seats}x {part}"))
+            }
+        });
     }
 
     fn unsupported(&mut self, waiting: &[&ast::Place], built: &Assembled) {
         let names: Vec<&str> = waiting.iter().map(|p| p.name.text.as_str()).collect();
         for place in waiting {
             let support = &place.on.segments[0].name;
-            if names.contains(&support.text.as_str()) {
+            if names.contains(&support.text.as_str()) || self.written.contains(&support.text) {
                 continue;
             }
             let message = format!("no component is named `{}`", support.text);
             let diagnostic = Diagnostic::error("E0201", support.span, message).label("unknown component");
             let known = built.groups.keys().map(String::as_str);
             self.report(match nearest(&support.text, known.clone().chain(names.iter().copied())) {
-                Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+                Some(near) => diagnostic.meant(support.span, near),
                 None => diagnostic.help(format!("components so far: {}", known.collect::<Vec<_>>().join(", "))),
             });
         }
@@ -304,6 +304,15 @@ fn is_free(value: Option<&Value>) -> bool {
 fn as_place(line: &ast::Line) -> Option<&ast::Place> {
     match &line.stmt {
         Stmt::Place(place) => Some(place),
+        _ => None,
+    }
+}
+
+/// The name of the component, or of the components, that a line puts into the assembly.
+fn component_name(line: &ast::Line) -> Option<&ast::Name> {
+    match &line.stmt {
+        Stmt::Place(place) => Some(&place.name),
+        Stmt::Root { name, .. } => Some(name),
         _ => None,
     }
 }

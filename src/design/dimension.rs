@@ -10,7 +10,7 @@ use super::scope::{Named, Remark, Resolver, Typed, Use};
 use super::sum::scaled;
 use super::tolerance::General;
 use crate::diag::suggest::nearest;
-use crate::diag::{Diagnostic, Span};
+use crate::diag::{Applicability, Diagnostic, Fix, Span};
 use crate::syntax::ast::{self, Size};
 use crate::units::{Quantity, Range};
 
@@ -140,18 +140,21 @@ impl Resolver {
             return Some(Typed { expr: Expr::Const(q.number.value), quantity: None });
         };
         let Some((quantity, factor)) = unit(&name.text) else {
-            let known = ["mm", "um", "cm", "m", "in", "deg", "rad", "px"];
+            // A slip of the pen seldom changes the first letter.
+            let mut known = ["mm", "um", "cm", "m", "in", "deg", "rad", "px"];
+            known.sort_by_key(|k| k.chars().next() != name.text.chars().next());
             let help = nearest(&name.text, known)
                 .or_else(|| known.into_iter().find(|k| k.len() > 1 && name.text.starts_with(k)));
             let diagnostic = Diagnostic::error("E0204", name.span, format!("unknown unit `{}`", name.text))
                 .label("not a unit")
                 .note("lengths: mm um cm m in; angles: deg rad; pictures: px; shares: %");
             self.report(match help {
-                Some(near) => diagnostic.help(format!("write `{} {near}`", q.number.text)),
+                Some(near) => diagnostic.suggest(format!("write `{} {near}`", q.number.text), name.span, near),
                 None => diagnostic,
             });
             return None;
         };
+        self.units.insert((name.span.file, name.span.start, name.span.end));
         Some(Typed { expr: Expr::Const(q.number.value * factor), quantity: Some(quantity) })
     }
 
@@ -180,11 +183,21 @@ impl Resolver {
             Quantity::Ratio => "%",
             Quantity::Pixels => "px",
         };
-        self.report(
-            Diagnostic::error("E0205", span, message)
-                .label(format!("{}, not {}", spoken(Some(got)), spoken(Some(want))))
-                .help(format!("its unit is `{unit}`")),
-        );
+        let fault = Diagnostic::error("E0205", span, message).label(format!(
+            "{}, not {}",
+            spoken(Some(got)),
+            spoken(Some(want))
+        ));
+        let inside = self.units.range((span.file, span.start, 0)..(span.file, span.end, 0));
+        let places: Vec<Span> = inside.map(|&(file, start, end)| Span { file, start, end }).collect();
+        let title = format!("its unit is `{unit}`");
+        self.report(match places.is_empty() {
+            true => fault.help(title),
+            false => {
+                let fix = Fix::new(title, Applicability::MaybeIncorrect);
+                fault.with_fix(places.into_iter().fold(fix, |fix, place| fix.edit(place, unit)))
+            }
+        });
     }
 
     /// Refuses arithmetic that has no value at nominal or somewhere within the limits.

@@ -105,7 +105,12 @@ impl Resolver {
                 let first = first.span;
                 self.duplicate("feature", &feature.name, first);
             }
-            features.extend(self.feature(feature, within, line.span));
+            match self.feature(feature, within, line.span) {
+                Some(made) => features.push(made),
+                None => {
+                    self.failed.insert(feature.name.text.clone());
+                }
+            }
         }
         features
     }

@@ -3,6 +3,7 @@
 //! In: `name = value` pairs. Out: single values in mm, rad and plain numbers, with a diagnostic for every name that is
 //! unknown, given twice or missing.
 
+use super::dimension::trim;
 use super::feature::Names;
 use super::model::Expr;
 use super::scope::Resolver;
@@ -17,13 +18,16 @@ pub struct Fields<'a> {
     /// `cylinder`, `camera`: what takes the fields.
     pub owner: String,
     pub span: Span,
+    /// Where one more field can be written, and what comes before it.
+    end: Option<(Span, &'static str)>,
     list: Vec<(&'a Name, &'a Value)>,
 }
 
 impl<'a> Fields<'a> {
     pub fn of_args(owner: &Name, args: &'a Args) -> Self {
-        let list = args.list.iter().map(|arg| (&arg.key, &arg.value)).collect();
-        Fields { owner: owner.text.clone(), span: owner.span, list }
+        let list: Vec<_> = args.list.iter().map(|arg| (&arg.key, &arg.value)).collect();
+        let end = list.last().map(|(_, value)| (behind(value.span()), ", "));
+        Fields { owner: owner.text.clone(), span: owner.span, end, list }
     }
 
     pub fn of_body(owner: &str, span: Span, body: &'a Body) -> Self {
@@ -31,17 +35,42 @@ impl<'a> Fields<'a> {
             Stmt::Field { key, value } => Some((key, value)),
             _ => None,
         };
-        Fields { owner: owner.to_string(), span, list: body.lines.iter().filter_map(field).collect() }
+        let list: Vec<_> = body.lines.iter().filter_map(field).collect();
+        let end = list.last().map(|(_, value)| (behind(value.span()), "\n    "));
+        Fields { owner: owner.to_string(), span, end, list }
     }
 
     pub fn none(owner: &str, span: Span) -> Self {
-        Fields { owner: owner.to_string(), span, list: Vec::new() }
+        Fields { owner: owner.to_string(), span, end: None, list: Vec::new() }
     }
 
     pub fn get(&self, key: &str) -> Option<&'a Value> {
         self.list.iter().find(|(name, _)| name.text == key).map(|(_, value)| *value)
     }
 }
+
+/// The empty span behind another.
+fn behind(span: Span) -> Span {
+    Span { start: span.end, ..span }
+}
+
+/// What arguments are called elsewhere.
+const SYNONYMS: [(&str, &str); 14] = [
+    ("dia", "d"),
+    ("diam", "d"),
+    ("diameter", "d"),
+    ("height", "h"),
+    ("length", "h"),
+    ("len", "h"),
+    ("l", "h"),
+    ("depth", "h"),
+    ("width", "x"),
+    ("length", "x"),
+    ("height", "z"),
+    ("thickness", "z"),
+    ("profile", "outline"),
+    ("distance", "pitch"),
+];
 
 /// A word a field may hold, and what it means.
 pub type Words<'w, T> = &'w [(&'w str, T)];
@@ -66,20 +95,30 @@ impl Resolver {
         let takes = known.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
         let message = format!("`{}` has no `{}`", fields.owner, name.text);
         let diagnostic = Diagnostic::error("E0206", name.span, message).label("unknown here");
-        self.report(match nearest(&name.text, known.iter().copied()) {
-            Some(near) => diagnostic.help(format!("did you mean `{near}`?")).note(format!("it takes {takes}")),
+        let synonym =
+            SYNONYMS.iter().find(|(word, key)| *word == name.text && known.contains(key)).map(|(_, key)| *key);
+        let free = |key: &&str| fields.get(key).is_none();
+        let near = synonym.or_else(|| nearest(&name.text, known.iter().copied())).filter(free);
+        self.meant.extend(near.map(|near| (fields.span, near.to_string())));
+        self.report(match near {
+            Some(near) => diagnostic.meant(name.span, near).note(format!("it takes {takes}")),
             None => diagnostic.help(format!("it takes {takes}")),
         });
     }
 
     /// Reports that a field is missing, with the line that would mend it.
     pub fn missing(&mut self, fields: &Fields, key: &str, example: &str) {
+        // Given, but under a wrong name that is reported.
+        if self.meant.iter().any(|(owner, meant)| *owner == fields.span && meant == key) {
+            return;
+        }
         let message = format!("`{}` needs `{key}`", fields.owner);
-        self.report(
-            Diagnostic::error("E0207", fields.span, message)
-                .label(format!("`{key}` is missing"))
-                .help(format!("write `{key} = {example}`")),
-        );
+        let diagnostic = Diagnostic::error("E0207", fields.span, message).label(format!("`{key}` is missing"));
+        let title = format!("write `{key} = {example}`");
+        self.report(match fields.end {
+            Some((at, separator)) => diagnostic.suggest(title, at, format!("{separator}{key} = {example}")),
+            None => diagnostic.help(title),
+        });
     }
 
     /// The dimension a field holds, or a diagnostic for what else it is.
@@ -132,11 +171,12 @@ impl Resolver {
         if range.low < range.high {
             let span = fields.get(key).map_or(fields.span, Value::span);
             let message = format!("`{key}` is exact and takes no tolerance");
-            self.report(
-                Diagnostic::error("E0211", span, message)
-                    .label("one number")
-                    .help(format!("write `{key} = {}`", range.nominal)),
-            );
+            let number = trim(range.nominal / self.file_scale(want, span));
+            self.report(Diagnostic::error("E0211", span, message).label("one number").suggest(
+                format!("write `{key} = {number}`"),
+                span,
+                number.to_string(),
+            ));
         }
         range.nominal
     }
@@ -168,7 +208,7 @@ impl Resolver {
         let diagnostic =
             Diagnostic::error("E0211", value.span(), format!("`{key}` is one of {list}")).label("not one of them");
         self.report(match text.and_then(|t| nearest(t, words.iter().map(|(w, _)| *w))) {
-            Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+            Some(near) => diagnostic.meant(value.span(), near),
             None => diagnostic,
         });
         default

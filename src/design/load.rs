@@ -3,11 +3,12 @@
 //! The only file of this stage that asks for texts, and it does so through a function: nothing here opens a file.
 
 use super::assemble::{Assembled, Catalogue};
+use super::beside;
 use super::model::{Design, Material, Station};
 use super::part::PartSource;
 use super::scope::{Named, Resolver, Title};
 use crate::diag::suggest::nearest;
-use crate::diag::{Diagnostic, Sources, Span};
+use crate::diag::{Applicability, Diagnostic, Fix, Sources, Span};
 use crate::iso::General;
 use crate::syntax::ast::{self, Stmt};
 use std::collections::BTreeMap;
@@ -46,12 +47,11 @@ pub fn load(path: &str, read: Read, set: &[(String, String)]) -> Loaded {
     let overrides = loader.overrides(set);
     let text = digest_text(&loader.sources);
     let Loader { sources, trees, mut diagnostics, .. } = loader;
-    let readable = !diagnostics.iter().any(Diagnostic::is_error);
     let mut design = None;
-    if readable {
+    if beside::is_worth_resolving(&diagnostics, &trees, &sources) {
         let (resolved, found) = resolve(&trees, &overrides);
         design = resolved;
-        diagnostics.extend(found);
+        diagnostics.extend(beside::independent(found, &trees, &sources));
     }
     tidy(&mut diagnostics);
     if diagnostics.iter().any(Diagnostic::is_error) {
@@ -76,11 +76,11 @@ fn tidy(diagnostics: &mut Vec<Diagnostic>) {
 }
 
 /// A file's tree, and its index in the sources.
-struct Tree {
-    file: u32,
+pub struct Tree {
+    pub file: u32,
     /// Not the spec itself but used by it: what it leaves unused is no fault.
     used: bool,
-    tree: ast::File,
+    pub tree: ast::File,
 }
 
 struct Loader<'a> {
@@ -119,7 +119,7 @@ impl Loader<'_> {
         let uses: Vec<ast::Name> = tree.lines.iter().filter_map(as_use).cloned().collect();
         self.trees.push(Tree { file, used: from.is_some(), tree });
         for name in uses {
-            self.file(&beside(path, &name.text), Some(name.span));
+            self.file(&relative(path, &name.text), Some(name.span));
         }
         self.open.pop();
     }
@@ -153,9 +153,13 @@ impl Loader<'_> {
         let start = Span { file, start: 0, end: 0 };
         let diagnostic = match (version, first.map(|line| line.span)) {
             (Some((VERSION, span)), Some(first)) if span == first => return,
-            (Some((VERSION, span)), _) => Diagnostic::error("E0105", span, "the version line comes first")
-                .label("not the first statement")
-                .help("move `gonogo 1` to the first line"),
+            (Some((VERSION, span)), first) => {
+                let top = first.unwrap_or(start);
+                let fix = Fix::new("move `gonogo 1` to the first line", Applicability::MachineApplicable);
+                Diagnostic::error("E0105", span, "the version line comes first")
+                    .label("not the first statement")
+                    .with_fix(fix.edit(Span { end: top.start, ..top }, "gonogo 1\n").edit(span, ""))
+            }
             (Some((version, span)), _) => Diagnostic::error(
                 "E0105",
                 span,
@@ -167,7 +171,11 @@ impl Loader<'_> {
             (None, _) if self.diagnostics.iter().any(|d| d.labels[0].span.file == file) => return,
             (None, first) => Diagnostic::error("E0105", first.unwrap_or(start), "the version line is missing")
                 .label("before this")
-                .help("begin with the line `gonogo 1`"),
+                .fix(
+                    "begin with the line `gonogo 1`",
+                    Span { end: first.unwrap_or(start).start, ..first.unwrap_or(start) },
+                    "gonogo 1\n",
+                ),
         };
         self.diagnostics.push(diagnostic);
     }
@@ -201,7 +209,7 @@ fn as_use(line: &ast::Line) -> Option<&ast::Name> {
 }
 
 /// The name of a file that `path` refers to as `name`, with `.` and `..` resolved as far as they can be.
-fn beside(path: &str, name: &str) -> String {
+fn relative(path: &str, name: &str) -> String {
     if name.starts_with('/') {
         return name.to_string();
     }
@@ -291,11 +299,12 @@ impl Resolver {
             let known = table.iter().find(|(unit, _)| *unit == name.text);
             known.map(|(_, factor)| *factor).unwrap_or_else(|| {
                 let message = format!("unknown unit `{}`", name.text);
-                self.report(
-                    Diagnostic::error("E0204", name.span, message)
-                        .label("not a unit here")
-                        .help(format!("write `{example}`")),
-                );
+                let near = nearest(&name.text, table.iter().map(|(unit, _)| *unit)).unwrap_or(example);
+                self.report(Diagnostic::error("E0204", name.span, message).label("not a unit here").suggest(
+                    format!("write `{near}`"),
+                    name.span,
+                    near,
+                ));
                 table[0].1
             })
         };
@@ -308,9 +317,11 @@ impl Resolver {
             let message = format!("unknown general tolerances `{}`", class.text);
             let known = ["ISO2768-f", "ISO2768-m", "ISO2768-c", "ISO2768-v", "exact"];
             let near = nearest(&class.text, known).unwrap_or("ISO2768-m");
-            self.report(
-                Diagnostic::error("E0302", class.span, message).label("unknown class").help(format!("write `{near}`")),
-            );
+            self.report(Diagnostic::error("E0302", class.span, message).label("unknown class").suggest(
+                format!("write `{near}`"),
+                class.span,
+                near,
+            ));
         }
         general
     }
@@ -412,7 +423,7 @@ impl Resolver {
             self.report(
                 Diagnostic::error("E0201", name.span, message)
                     .label("unknown assembly")
-                    .help(format!("did you mean `{}`?", assembly.text)),
+                    .meant(name.span, &assembly.text),
             );
         }
     }

@@ -76,11 +76,18 @@ impl Resolver {
         let (step, rest) = path.split_once('.').map_or((path, None), |(step, rest)| (step, Some(rest)));
         let (name, index) = step.split_once('[').map_or((step, None), |(name, index)| (name, Some(index)));
         let Some(feature) = features.iter().find(|f| f.name == name) else {
+            if self.failed.contains(name) {
+                return None;
+            }
             let message = format!("{owner} has no feature `{name}`");
             let diagnostic = Diagnostic::error("E0201", span, message).label("unknown feature");
             let names = features.iter().map(|f| f.name.as_str());
             self.report(match nearest(name, names.clone()) {
-                Some(near) => diagnostic.help(format!("did you mean `{near}{}`?", &path[name.len()..])),
+                Some(near) => diagnostic.suggest(
+                    format!("did you mean `{near}{}`?", &path[name.len()..]),
+                    face_end(span, path.len()),
+                    format!("{near}{}", &path[name.len()..]),
+                ),
                 None => diagnostic.help(format!("its features: {}", names.collect::<Vec<_>>().join(", "))),
             });
             return None;
@@ -119,11 +126,14 @@ impl Resolver {
     fn one_component(&mut self, segment: &ast::Segment, built: &Assembled) -> Option<usize> {
         let name = &segment.name.text;
         let Some(group) = built.groups.get(name) else {
+            if self.written.contains(name) {
+                return None;
+            }
             let message = format!("no component is named `{name}`");
             let diagnostic = Diagnostic::error("E0201", segment.name.span, message).label("unknown component");
             let known = built.groups.keys().map(String::as_str);
             self.report(match nearest(name, known.clone()) {
-                Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+                Some(near) => diagnostic.meant(segment.name.span, near),
                 None => diagnostic.help(format!("components: {}", known.collect::<Vec<_>>().join(", "))),
             });
             return None;
@@ -133,11 +143,22 @@ impl Resolver {
             return Some(group[*one]);
         }
         let message = format!("`{name}` names {} components, and a measure starts and ends at one", chosen.len());
-        self.report(
-            Diagnostic::error("E0505", segment.name.span, message)
-                .label("which one?")
-                .help(format!("write `{name}[{}]`", chosen.first().map_or(1, |i| i + 1))),
-        );
+        let first = chosen.first().map_or(1, |i| i + 1);
+        self.report(Diagnostic::error("E0505", segment.name.span, message).label("which one?").suggest(
+            format!("write `{name}[{first}]`"),
+            segment_span(segment),
+            format!("{name}[{first}]"),
+        ));
         None
     }
+}
+
+/// The last `len` bytes of a face: its path in the part.
+fn face_end(span: Span, len: usize) -> Span {
+    Span { start: span.end - len as u32, ..span }
+}
+
+/// A segment with its index.
+fn segment_span(segment: &ast::Segment) -> Span {
+    Span { end: segment.index.as_ref().map_or(segment.name.span.end, |i| i.span.end), ..segment.name.span }
 }

@@ -4,6 +4,7 @@
 //! with the spec. Never builds a solid and never opens a file itself.
 
 mod assemble;
+mod beside;
 mod dimension;
 mod feature;
 mod fields;

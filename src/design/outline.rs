@@ -65,7 +65,7 @@ impl Resolver {
         let diagnostic =
             Diagnostic::error("E0201", span, format!("no outline is named `{name}`")).label("unknown outline");
         self.report(match nearest(name, self.outlines.keys().map(String::as_str)) {
-            Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+            Some(near) => diagnostic.meant(span, near),
             None => diagnostic.help(format!("draw it in the part: `outline {name} {{ from (0, 0) … }}`")),
         });
         None

@@ -84,7 +84,7 @@ impl Resolver {
             Diagnostic::error("E0202", name.span, message)
                 .label("defined again")
                 .also(first, "first defined here")
-                .help(format!("name it `{}_2`", name.text)),
+                .suggest(format!("name it `{}_2`", name.text), name.span, format!("{}_2", name.text)),
         );
     }
 
@@ -160,7 +160,7 @@ impl Resolver {
             }
         };
         self.report(match nearest(name, materials.keys().copied()) {
-            Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+            Some(near) => diagnostic.meant(dim.span, near),
             None if known_as.is_some() => {
                 diagnostic.help(format!("materials: {}", materials.keys().copied().collect::<Vec<_>>().join(", ")))
             }

@@ -68,6 +68,8 @@ impl Named {
 pub struct Remark {
     /// MMC and LMC as stated.
     pub states: Option<[f64; 2]>,
+    /// Where the words `mmc` and `lmc` stand.
+    pub state_words: Option<[Span; 2]>,
     /// The fit class as stated.
     pub fit: Option<(String, Span)>,
     /// Every copy of a pattern has its own.
@@ -86,6 +88,13 @@ pub struct Resolver {
     pub used: BTreeSet<Span2>,
     /// Indices of the materials in use.
     pub used_materials: BTreeSet<usize>,
+    /// Where units are written: what has the wrong one is shown with another.
+    pub units: BTreeSet<Span2>,
+    /// Components that are written, and features that could not be made: neither is unknown.
+    pub written: BTreeSet<String>,
+    pub failed: BTreeSet<String>,
+    /// Arguments that are unknown and reported, with the one that was probably meant.
+    pub meant: Vec<(Span, String)>,
     /// What each name of the spec names: `part`, `material` …, for messages.
     pub kinds: BTreeMap<String, &'static str>,
     pub dims: Vec<Dimension>,
@@ -103,7 +112,7 @@ pub struct Resolver {
 }
 
 /// A span as an ordered key.
-type Span2 = (u32, u32, u32);
+pub type Span2 = (u32, u32, u32);
 
 impl Resolver {
     pub fn title(&self, span: Span) -> Title {
@@ -196,11 +205,12 @@ impl Resolver {
 
     fn unknown_dimension(&mut self, name: &str, span: Span) {
         let known = self.locals.keys().chain(self.globals.keys()).map(String::as_str);
-        let hint = match nearest(name, known) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => format!("define it above: `let {name} = 10`"),
-        };
-        let message = format!("no dimension is named `{name}`");
-        self.report(Diagnostic::error("E0201", span, message).label("unknown name").help(hint));
+        let near = nearest(name, known).map(str::to_string);
+        let diagnostic =
+            Diagnostic::error("E0201", span, format!("no dimension is named `{name}`")).label("unknown name");
+        self.report(match near {
+            Some(near) => diagnostic.meant(span, &near),
+            None => diagnostic.help(format!("define it above: `let {name} = 10`")),
+        });
     }
 }

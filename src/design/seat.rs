@@ -68,12 +68,12 @@ impl Resolver {
 
     fn feature_named<'f>(&mut self, owner: &str, features: &'f [Feature], name: &ast::Name) -> Option<&'f Feature> {
         let found = features.iter().find(|f| f.name == name.text);
-        if found.is_none() {
+        if found.is_none() && !self.failed.contains(&name.text) {
             let message = format!("{owner} has no feature `{}`", name.text);
             let diagnostic = Diagnostic::error("E0201", name.span, message).label("unknown feature");
             let names = features.iter().map(|f| f.name.as_str());
             self.report(match nearest(&name.text, names.clone()) {
-                Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+                Some(near) => diagnostic.meant(name.span, near),
                 None => diagnostic.help(format!("its features: {}", names.collect::<Vec<_>>().join(", "))),
             });
         }
@@ -98,11 +98,11 @@ impl Resolver {
             return Some((index.first as usize - 1..last as usize).collect());
         }
         let message = format!("`{}` has {}", segment.name.text, copies(count));
-        self.report(
-            Diagnostic::error("E0505", index.span, message)
-                .label("no such copy")
-                .help(format!("write `{}[1]`", segment.name.text)),
-        );
+        self.report(Diagnostic::error("E0505", index.span, message).label("no such copy").suggest(
+            format!("write `{}[1]`", segment.name.text),
+            index.span,
+            "[1]",
+        ));
         None
     }
 }

@@ -60,7 +60,7 @@ impl Resolver {
             _ if word == "group" => {
                 diagnostic.help("a group has braces: `group { add body = box(x = 1, y = 1, z = 1) }`")
             }
-            Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+            Some(near) => diagnostic.meant(name.span, near),
             None => diagnostic,
         });
     }
@@ -154,11 +154,11 @@ impl Sizes<'_, '_> {
         let owner = self.context.names.of(key, false);
         if dim.word() == Some("through") {
             let message = format!("`{key}` cannot be `through`: only the height of a cut can");
-            self.resolver.report(
-                Diagnostic::error("E0211", dim.span, message)
-                    .label("needs a size")
-                    .help(format!("write `{key} = {example}`")),
-            );
+            self.resolver.report(Diagnostic::error("E0211", dim.span, message).label("needs a size").suggest(
+                format!("write `{key} = {example}`"),
+                dim.span,
+                example,
+            ));
             return None;
         }
         let expr = self.resolver.dimension(dim, Quantity::Length, general, &self.context.names.of(key, dim.each))?;
@@ -206,11 +206,11 @@ impl Sizes<'_, '_> {
             return Some(Extent::Through);
         }
         let message = if self.context.in_cut { "a cone cannot be `through`" } else { "only a cut can be `through`" };
-        self.resolver.report(
-            Diagnostic::error("E0211", self.span_of(key), message)
-                .label("needs a length")
-                .help(format!("write `{key} = 10`")),
-        );
+        self.resolver.report(Diagnostic::error("E0211", self.span_of(key), message).label("needs a length").suggest(
+            format!("write `{key} = 10`"),
+            self.span_of(key),
+            "10",
+        ));
         None
     }
 }

@@ -35,7 +35,9 @@ impl Resolver {
         }
         let watch = depths.iter().enumerate().filter_map(|(component, d)| d.map(|depth| Watch { component, depth }));
         let watch: Vec<Watch> = watch.collect();
-        if watch.is_empty() && !built.components.is_empty() && span != Span::default() {
+        // What is wrong elsewhere may be why.
+        let faulty = self.diagnostics.iter().any(Diagnostic::is_error);
+        if watch.is_empty() && !faulty && !built.components.is_empty() && span != Span::default() {
             let message = "nothing is watched";
             self.report(
                 Diagnostic::error("E0207", span, message)
@@ -58,11 +60,14 @@ impl Resolver {
     fn watched(&mut self, path: &Path, built: &Assembled) -> Vec<usize> {
         let Some((first, rest)) = path.segments.split_first() else { return Vec::new() };
         let Some(group) = built.groups.get(&first.name.text) else {
+            if self.written.contains(&first.name.text) {
+                return Vec::new();
+            }
             let message = format!("no component is named `{}`", first.name.text);
             let diagnostic = Diagnostic::error("E0201", first.name.span, message).label("unknown component");
             let known = built.groups.keys().map(String::as_str);
             self.report(match nearest(&first.name.text, known.clone()) {
-                Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+                Some(near) => diagnostic.meant(first.name.span, near),
                 None => diagnostic.help(format!("components: {}", known.collect::<Vec<_>>().join(", "))),
             });
             return Vec::new();

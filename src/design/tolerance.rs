@@ -5,6 +5,7 @@
 
 use super::dimension::{trim, unit};
 use super::scope::{Remark, Resolver, Use};
+use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::iso::{self, FitError};
 use crate::syntax::ast::{self, Size, Tolerance};
@@ -83,7 +84,7 @@ impl Resolver {
                 });
                 let (high, low) = (high?, low?);
                 if high < low {
-                    self.reversed(dim.span, &upper.text, &lower.text);
+                    self.reversed(dim, [upper, lower], unit.as_ref());
                     return None;
                 }
                 limited(Range::about(nominal, nominal + low, nominal + high))
@@ -97,11 +98,15 @@ impl Resolver {
                 let high = self.same_scale(other, quantity, q.span, want)?;
                 if high < nominal {
                     let message = format!("the upper limit {} is below the lower limit", q.number.text);
-                    self.report(
-                        Diagnostic::error("E0301", dim.span, message)
-                            .label("limits reversed")
-                            .help(format!("write the smaller limit first: `{} .. …`", q.number.text)),
-                    );
+                    let fault = Diagnostic::error("E0301", dim.span, message).label("limits reversed");
+                    self.report(match &dim.size {
+                        Size::Quantity(first) => {
+                            let limits = format!("{} .. {}", written(q), written(first));
+                            let each = if dim.each { " each" } else { "" };
+                            fault.fix(format!("write `{limits}`"), dim.span, limits + each)
+                        }
+                        _ => fault.help("write the smaller limit first"),
+                    });
                     return None;
                 }
                 limited(Range { low: nominal, nominal: (nominal + high) / 2.0, high })
@@ -135,10 +140,14 @@ impl Resolver {
     fn no_fit(&mut self, error: FitError, class: &ast::Name, nominal: f64) {
         let diagnostic = match error {
             FitError::UnknownClass => {
-                Diagnostic::error("E0302", class.span, format!("no ISO 286 class `{}`", class.text))
+                let fault = Diagnostic::error("E0302", class.span, format!("no ISO 286 class `{}`", class.text))
                     .label("unknown class")
-                    .help("a class is a letter and a grade, such as `H7` for a hole or `g6` for a shaft")
-                    .note("known: d e f g h js k m n p and D to P, grades 4 to 12")
+                    .note("a class is a letter and a grade, such as `H7` for a hole or `g6` for a shaft")
+                    .note("known: d e f g h js k m n p and D to P, grades 4 to 12");
+                match nearest_class(&class.text, nominal) {
+                    Some(near) => fault.meant(class.span, &near),
+                    None => fault,
+                }
             }
             FitError::OutsideTable => {
                 let message = format!("fits cover sizes over 0 up to {} mm, this is {nominal} mm", iso::LARGEST);
@@ -158,6 +167,7 @@ impl Resolver {
     ) -> Option<Limited> {
         let mut values: [Option<f64>; 3] = [None; 3];
         let mut quantity = None;
+        let mut spans = [(span, span); 3];
         for (name, written) in states {
             let own = written.unit.clone().or(unit.cloned());
             let typed = self.quantity(&ast::Quantity { unit: own, ..written.clone() })?;
@@ -167,6 +177,7 @@ impl Resolver {
                 self.report(Diagnostic::error("E0202", name.span, message).label("given again"));
                 return None;
             }
+            spans[slot] = (name.span, written.span);
             quantity = typed.quantity;
         }
         let [Some(mmc), nominal, Some(lmc)] = values else {
@@ -178,14 +189,17 @@ impl Resolver {
         let (low, high) = (mmc.min(lmc), mmc.max(lmc));
         if !(low..=high).contains(&nominal) {
             let message = format!("the nominal size {nominal} lies outside {low} .. {high}");
-            self.report(
-                Diagnostic::error("E0306", span, message)
-                    .label("nominal outside its limits")
-                    .help(format!("write `{{ mmc {mmc}, nominal {}, lmc {lmc} }}`", trim((mmc + lmc) / 2.0))),
-            );
+            let fault = Diagnostic::error("E0306", span, message).label("nominal outside its limits");
+            let middle = trim((mmc + lmc) / 2.0).to_string();
+            // With units of their own the limits are in mm already, and the text is not.
+            self.report(match quantity {
+                None => fault.suggest(format!("write `nominal {middle}`, their middle"), spans[1].1, middle),
+                Some(_) => fault.help("give a nominal size between them"),
+            });
             return None;
         }
-        let remark = Remark { states: Some([mmc, lmc]), ..Remark::default() };
+        let words = [spans[0].0, spans[2].0];
+        let remark = Remark { states: Some([mmc, lmc]), state_words: Some(words), ..Remark::default() };
         Some(Limited { range: Range { low, nominal, high }, quantity, remark })
     }
 
@@ -210,7 +224,8 @@ impl Resolver {
                     self.report(
                         Diagnostic::error("E0303", dim.span, message)
                             .label("needs a tolerance of its own")
-                            .help(format!("write `{nominal} ±0.1`, or `{nominal} basic` for exactly this size")),
+                            .suggest("`basic` for exactly this size", behind(dim), " basic")
+                            .suggest("limits of its own", behind(dim), " ±0.1"),
                     );
                     return None;
                 };
@@ -254,16 +269,19 @@ impl Resolver {
         self.same_scale(typed, quantity, q.span, want)
     }
 
-    fn reversed(&mut self, span: Span, upper: &str, lower: &str) {
-        self.report(
-            Diagnostic::error(
-                "E0301",
-                span,
-                format!("the upper deviation {upper} is below the lower deviation {lower}"),
-            )
-            .label("deviations reversed")
-            .help(format!("swap them: `{lower}/{upper}`")),
-        );
+    fn reversed(&mut self, dim: &ast::Dim, [upper, lower]: [&ast::Number; 2], unit: Option<&ast::Name>) {
+        let [upper, lower] = [&upper.text, &lower.text];
+        let message = format!("the upper deviation {upper} is below the lower deviation {lower}");
+        let fault = Diagnostic::error("E0301", dim.span, message).label("deviations reversed");
+        let title = format!("swap them: `{lower}/{upper}`");
+        self.report(match &dim.size {
+            Size::Quantity(size) => {
+                let unit = unit.map(|u| format!(" {}", u.text)).unwrap_or_default();
+                let each = if dim.each { " each" } else { "" };
+                fault.fix(title, dim.span, format!("{} {lower}/{upper}{unit}{each}", written(size)))
+            }
+            _ => fault.help(title),
+        });
     }
 
     /// Warns of a deviation so large that its unit is probably wrong.
@@ -281,16 +299,47 @@ impl Resolver {
         }
         let factor = |u: Option<&ast::Name>| u.and_then(|u| unit(&u.text)).map(|(_, f)| f);
         let size = q.number.value * factor(q.unit.as_ref()).unwrap_or(self.title(dim.span).length);
+        let number = deviation;
         let deviation = deviation * factor(own.or(q.unit.as_ref())).unwrap_or(self.title(dim.span).length);
         if deviation <= DOUBTFUL_SHARE * size.abs() {
             return;
         }
         let share = 100.0 * deviation / size.abs();
         let message = format!("the tolerance of {owner} is {share:.0} % of its size");
-        self.report(Diagnostic::warning("W0310", dim.span, message).label("a wide tolerance").help(format!(
-            "did you mean `{text} um`? Limits say that it is meant: `{} .. {}`",
+        let warning = Diagnostic::warning("W0310", dim.span, message).label("a wide tolerance").note(format!(
+            "limits say that it is meant: `{} .. {}`",
             trim(size - deviation),
             trim(size + deviation)
-        )));
+        ));
+        let (title, in_um) = (format!("did you mean `{text} um`?"), 1e-3 * number <= DOUBTFUL_SHARE * size.abs());
+        self.report(match own {
+            _ if !in_um => warning,
+            None if !dim.each => warning.suggest(title, Span { start: dim.span.end, ..dim.span }, " um"),
+            None => warning.help(title),
+            Some(unit) => warning.suggest(title, unit.span, "um"),
+        });
     }
+}
+
+/// A quantity as it is written.
+fn written(q: &ast::Quantity) -> String {
+    match &q.unit {
+        Some(unit) => format!("{} {}", q.number.text, unit.text),
+        None => q.number.text.clone(),
+    }
+}
+
+/// The place of a tolerance behind a size without one.
+fn behind(dim: &ast::Dim) -> Span {
+    let each = if dim.each { " each".len() as u32 } else { 0 };
+    Span { start: dim.span.end - each, end: dim.span.end - each, ..dim.span }
+}
+
+/// The class that is nearest to a word, of those that exist for the size.
+fn nearest_class(word: &str, size: f64) -> Option<String> {
+    let letters = ["d", "e", "f", "g", "h", "js", "k", "m", "n", "p"];
+    let classes = letters.iter().flat_map(|l| (4..=12).map(move |grade| format!("{l}{grade}")));
+    let classes: Vec<String> = classes.flat_map(|c| [c.to_uppercase(), c]).collect();
+    let known = classes.iter().filter(|class| iso::fit(class, size).is_ok()).map(String::as_str);
+    nearest(word, known).map(str::to_string)
 }

@@ -32,6 +32,7 @@ const PAGES: &[(&str, &str)] = &[
     ("W0311", include_str!("explain/W0311.md")),
     ("W0312", include_str!("explain/W0312.md")),
     ("E0401", include_str!("explain/E0401.md")),
+    ("W0402", include_str!("explain/W0402.md")),
     ("E0403", include_str!("explain/E0403.md")),
     ("E0405", include_str!("explain/E0405.md")),
     ("E0406", include_str!("explain/E0406.md")),
@@ -68,6 +69,11 @@ pub fn explain(code: &str) -> Option<&'static str> {
 /// Every code that has a page.
 pub fn codes() -> impl Iterator<Item = &'static str> {
     PAGES.iter().map(|(code, _)| *code)
+}
+
+/// What a code means, in the words its page begins with.
+pub fn title(code: &str) -> Option<&'static str> {
+    explain(code)?.lines().next()?.split_once(": ").map(|(_, title)| title)
 }
 
 #[cfg(test)]

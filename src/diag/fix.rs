@@ -48,14 +48,14 @@ impl Fix {
     }
 }
 
-/// `text`, which is that of `file`, with the edits of `fixes`, and how many of the fixes were made.
+/// `text`, which is that of `file`, with the edits of `fixes`, and which of the fixes were made.
 ///
 /// A fix is left out whole when it touches another file, reaches beyond the text, cuts a character in two, or touches
 /// the place of one made before: the earlier in the list wins.
-pub fn apply<'a>(text: &str, file: u32, fixes: impl IntoIterator<Item = &'a Fix>) -> (String, usize) {
+pub fn apply<'a>(text: &str, file: u32, fixes: impl IntoIterator<Item = &'a Fix>) -> (String, Vec<usize>) {
     let mut edits: Vec<&Edit> = Vec::new();
-    let mut made = 0;
-    for fix in fixes {
+    let mut made = Vec::new();
+    for (index, fix) in fixes.into_iter().enumerate() {
         let fits = |edit: &Edit| edit.span.file == file && text.get(range(edit)).is_some();
         let mut all = edits.clone();
         all.extend(&fix.edits);
@@ -63,7 +63,7 @@ pub fn apply<'a>(text: &str, file: u32, fixes: impl IntoIterator<Item = &'a Fix>
         if !fix.edits.is_empty() && fix.edits.iter().all(fits) && all.windows(2).all(|pair| are_apart(pair[0], pair[1]))
         {
             edits = all;
-            made += 1;
+            made.push(index);
         }
     }
     (edited(text, &edits), made)
@@ -98,17 +98,20 @@ mod tests {
 
     #[test]
     fn edits_are_made_whatever_their_order() {
-        assert_eq!(apply("a b c", 0, &[fix(4, 5, "z"), fix(0, 1, "xy")]), ("xy b z".to_string(), 2));
-        assert_eq!(apply("a b c", 0, &[fix(2, 2, "± ")]), ("a ± b c".to_string(), 1));
+        assert_eq!(apply("a b c", 0, &[fix(4, 5, "z"), fix(0, 1, "xy")]), ("xy b z".to_string(), vec![0, 1]));
+        assert_eq!(apply("a b c", 0, &[fix(2, 2, "± ")]), ("a ± b c".to_string(), vec![0]));
     }
 
     #[test]
     fn what_meets_another_or_does_not_fit_is_left_out_whole() {
-        assert_eq!(apply("abcdef", 0, &[fix(1, 3, "-"), fix(2, 4, "+"), fix(3, 4, "*")]), ("a-def".to_string(), 1));
-        assert_eq!(apply("a±b", 0, &[fix(2, 3, "x"), fix(9, 9, "x"), fix(3, 2, "x")]), ("a±b".to_string(), 0));
+        assert_eq!(
+            apply("abcdef", 0, &[fix(1, 3, "-"), fix(2, 4, "+"), fix(3, 4, "*")]),
+            ("a-def".to_string(), vec![0])
+        );
+        assert_eq!(apply("a±b", 0, &[fix(2, 3, "x"), fix(9, 9, "x"), fix(3, 2, "x")]), ("a±b".to_string(), vec![]));
         let mut two = fix(0, 1, "x");
         two.edits.push(Edit { span: Span { file: 1, start: 0, end: 0 }, text: "y".into() });
-        assert_eq!(apply("abc", 0, &[two]), ("abc".to_string(), 0));
-        assert_eq!(apply("abc", 0, &[Fix::new("", Applicability::MaybeIncorrect)]), ("abc".to_string(), 0));
+        assert_eq!(apply("abc", 0, &[two]), ("abc".to_string(), vec![]));
+        assert_eq!(apply("abc", 0, &[Fix::new("", Applicability::MaybeIncorrect)]), ("abc".to_string(), vec![]));
     }
 }

@@ -6,7 +6,7 @@ mod explain;
 mod fix;
 pub mod suggest;
 
-pub use explain::{codes, explain};
+pub use explain::{codes, explain, title};
 pub use fix::{Applicability, Edit, Fix, apply};
 
 use serde::Serialize;
@@ -102,6 +102,11 @@ impl Diagnostic {
     /// A change that mends it if it is what was meant.
     pub fn suggest(self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
         self.with_fix(Fix::new(title, Applicability::MaybeIncorrect).edit(span, text))
+    }
+
+    /// The name that was probably meant.
+    pub fn meant(self, span: Span, name: &str) -> Self {
+        self.suggest(format!("did you mean `{name}`?"), span, name)
     }
 
     /// Adds a fix; its title is the help unless something else was said.

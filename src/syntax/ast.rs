@@ -12,6 +12,9 @@ pub struct File {
     pub lines: Vec<Line>,
     /// Comments and blank lines after the last item.
     pub end: Vec<Gap>,
+    /// What could not be read and is reported: names that stand here are not unknown.
+    #[serde(skip)]
+    pub lost: Vec<Span>,
 }
 
 /// A statement with the comments that belong to it.

@@ -7,6 +7,8 @@
 pub mod ast;
 mod faults;
 mod format;
+mod heads;
+mod letters;
 mod parse;
 mod scan;
 

@@ -1,15 +1,20 @@
 //! Cuts a file into items before anything is parsed, and finds the block that lost its brace.
 //!
-//! In: text. Out: the stretches of text that hold one item each, and diagnostics for braces and parentheses that do not
-//! pair up. A parser alone would report a lost `}` at the next item; indentation tells where it was meant to be.
+//! In: text. Out: the stretches of text that hold one item each, diagnostics for braces and parentheses that do not pair
+//! up, and the repairs with which the parser can read on. A parser alone would report a lost `}` at the next item;
+//! indentation tells where it was meant to be.
 
 use crate::diag::{Diagnostic, Span};
+use std::ops::Range;
 
 /// Parentheses nested deeper than this are refused, which bounds the parser's recursion.
 pub const MAX_NESTING: usize = 32;
 
 /// More operators than this inside one pair of parentheses are refused: a sum is as deep as it is long.
 const MAX_OPERATORS: usize = 300;
+
+/// Faults of brackets after which the rest is not looked into: they cost time, and nobody reads them.
+const ENOUGH: usize = 100;
 
 /// A stretch of the text that holds one item and the comments above it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,10 +25,44 @@ pub struct Chunk {
     pub broken: bool,
 }
 
+/// What a text is made of.
+pub struct Scanned {
+    pub chunks: Vec<Chunk>,
+    pub diagnostics: Vec<Diagnostic>,
+    /// Bytes to be put in the place of others, so that the brackets pair up.
+    pub repairs: Vec<(usize, u8)>,
+    /// Statements that cannot be read.
+    pub lost: Vec<Range<usize>>,
+}
+
 /// Cuts `text` at the lines that begin outside all brackets.
-pub fn scan(text: &str, file: u32) -> (Vec<Chunk>, Vec<Diagnostic>) {
-    let mut scanner =
-        Scanner { text, file, open: Vec::new(), chunks: Vec::new(), diagnostics: Vec::new(), broken: false };
+///
+/// Where braces do not pair up, indentation is asked a second time: a line that stands no deeper than the head of the block
+/// it would be in does not belong to it. A text whose braces pair up may be indented as it likes.
+pub fn scan(text: &str, file: u32) -> Scanned {
+    let plain = scan_once(text, file, false);
+    if !plain.diagnostics.iter().any(|d| d.code == "E0102") {
+        return plain;
+    }
+    let strict = scan_once(text, file, true);
+    if strict.diagnostics.len() <= plain.diagnostics.len() { strict } else { plain }
+}
+
+fn scan_once(text: &str, file: u32, strict: bool) -> Scanned {
+    let mut scanner = Scanner {
+        text,
+        file,
+        strict,
+        open: Vec::new(),
+        chunks: Vec::new(),
+        diagnostics: Vec::new(),
+        repairs: Vec::new(),
+        lost: Vec::new(),
+        broken: false,
+        early: None,
+        code_end: 0,
+        line_start: 0,
+    };
     let mut start = 0;
     for line in text.split_inclusive('\n') {
         scanner.line(start, line);
@@ -31,7 +70,8 @@ pub fn scan(text: &str, file: u32) -> (Vec<Chunk>, Vec<Diagnostic>) {
     }
     scanner.lose_all_open("the end of the file");
     scanner.finish_chunk(text.len());
-    (scanner.chunks, scanner.diagnostics)
+    let Scanner { chunks, diagnostics, repairs, lost, .. } = scanner;
+    Scanned { chunks, diagnostics, repairs, lost }
 }
 
 /// An opening bracket that still waits for its partner.
@@ -39,27 +79,52 @@ struct Open {
     bracket: u8,
     at: usize,
     indent: usize,
+    /// Of the first line inside; a block's lines say where it ends.
+    inner: Option<usize>,
     operators: usize,
 }
 
 struct Scanner<'a> {
     text: &'a str,
     file: u32,
+    strict: bool,
     open: Vec<Open>,
     chunks: Vec<Chunk>,
     diagnostics: Vec<Diagnostic>,
+    repairs: Vec<(usize, u8)>,
+    lost: Vec<Range<usize>>,
     broken: bool,
+    early: Option<Early>,
+    /// The end of the last code before the line at hand.
+    code_end: usize,
+    line_start: usize,
+}
+
+/// A `}` that ends an item but does not line up with it: if one is left over below, this one came too early.
+struct Early {
+    at: usize,
+    /// Of the `{` that it closed.
+    open: usize,
+    /// The chunk it ended.
+    chunk: usize,
 }
 
 impl Scanner<'_> {
     fn line(&mut self, start: usize, line: &str) {
         let code = strip_comment(line);
+        self.line_start = start;
         let words = code.trim_start();
         if words.trim_end().is_empty() {
             return;
         }
         let indent = code.len() - words.len();
         self.lose_parentheses_before(words);
+        if self.strict && !words.starts_with('}') {
+            self.lose_blocks_left_by(indent);
+        }
+        if let Some(open) = self.open.last_mut().filter(|o| o.bracket == b'{') {
+            open.inner.get_or_insert(indent);
+        }
         if indent == 0 && !self.open.is_empty() && starts_block_item(words) {
             self.lose_all_open(&format!("line {}", line_number(self.text, start)));
         }
@@ -69,13 +134,17 @@ impl Scanner<'_> {
             let start = self.chunks.last().map_or(0, |chunk| chunk.end);
             self.chunks.push(Chunk { start, end: start, broken: false });
         }
+        if indent == 0 && starts_block_item(words) {
+            self.early = None;
+        }
         self.brackets(start, code, indent);
+        self.code_end = start + code.trim_end().len();
     }
 
     fn brackets(&mut self, start: usize, code: &str, indent: usize) {
         for (at, byte) in outside_strings(code) {
             match byte {
-                b'(' | b'{' => self.open(Open { bracket: byte, at: start + at, indent, operators: 0 }),
+                b'(' | b'{' => self.open(Open { bracket: byte, at: start + at, indent, inner: None, operators: 0 }),
                 b')' => self.close(b'(', start + at, None),
                 b'}' => self.close(b'{', start + at, code[..at].trim().is_empty().then_some(indent)),
                 b'+' | b'-' | b'*' | b'/' => self.operator(),
@@ -111,21 +180,93 @@ impl Scanner<'_> {
                 self.lose_blocks_deeper_than(indent, at);
             }
             while self.open.last().is_some_and(|o| o.bracket == b'(') {
-                self.lose_last(&format!("line {}", line_number(self.text, at)));
+                self.lose_last(&format!("line {}", line_number(self.text, at)), at);
             }
         }
         match self.open.last() {
             Some(open) if open.bracket == bracket => {
+                let (from, lines_up) = (open.at, indent == Some(open.indent));
                 self.open.pop();
+                let one_line = !self.text[from..at].contains('\n');
+                if self.open.is_empty() && bracket == b'{' && !lines_up && !one_line {
+                    let chunk = self.chunks.len().saturating_sub(1);
+                    self.early = Some(Early { at, open: from, chunk });
+                }
             }
-            _ => self.closes_nothing(bracket, at),
+            _ if bracket == b'(' => self.closes_no_parenthesis(at),
+            _ => self.closes_no_block(at),
         }
     }
 
-    fn closes_nothing(&mut self, bracket: u8, at: usize) {
-        let (code, sign) = if bracket == b'{' { ("E0102", '}') } else { ("E0101", ')') };
-        let message = format!("this `{sign}` closes nothing");
-        self.report(Diagnostic::error(code, self.span(at, 1), message).label("no bracket is open here"));
+    /// A `)` too many, or a `(` too few: `cylinder d = 9)`.
+    fn closes_no_parenthesis(&mut self, at: usize) {
+        if self.has_enough() {
+            return;
+        }
+        let fault = Diagnostic::error("E0101", self.span(at, 1), "this `)` closes nothing");
+        let fault = fault.label("no parenthesis is open here");
+        self.repairs.push((at, b' '));
+        let Some((from, to)) = self.opening_place(at) else {
+            return self.diagnostics.push(fault.fix("remove it", self.span(at, 1), ""));
+        };
+        let span = self.span(from, to - from);
+        self.diagnostics.push(fault.also(span, "a `(` is missing here").fix("write the `(`", span, "("));
+        let end = line_end(self.text, at);
+        self.lost.push(self.line_start..end);
+        self.blank(self.line_start, end);
+    }
+
+    /// The blank between a word and an argument, `cylinder d = …`, on the line up to `at`.
+    fn opening_place(&self, at: usize) -> Option<(usize, usize)> {
+        let line = &self.text[self.line_start..at];
+        let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        for (i, _) in line.match_indices('=').skip(1) {
+            let key = line[..i].trim_end();
+            let before = key.trim_end_matches(word);
+            let owner = before.trim_end();
+            if key.len() > before.len() && before.len() > owner.len() && owner.ends_with(word) {
+                return Some((self.line_start + owner.len(), self.line_start + before.len()));
+            }
+            if line[..i].contains('(') {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// A `}` too many: the one that came too early, if there is one, else this.
+    fn closes_no_block(&mut self, at: usize) {
+        if self.has_enough() {
+            return;
+        }
+        let Some(Early { at: early, open, chunk }) = self.early.take() else {
+            let fault = Diagnostic::error("E0102", self.span(at, 1), "this `}` closes nothing");
+            self.repairs.push((at, b' '));
+            self.diagnostics.push(fault.label("no block is open here").fix("remove it", self.span(at, 1), ""));
+            return;
+        };
+        let message = format!("this `}}` closes the block{} too early", owner(self.text, open));
+        let fault = Diagnostic::error("E0102", self.span(early, 1), message)
+            .label("not at its end")
+            .also(self.span(open, 1), "opened here")
+            .also(self.span(at, 1), "this one is left over");
+        self.diagnostics.push(fault.fix("remove it", self.span(early, 1), ""));
+        self.repairs.push((early, b' '));
+        // What seemed to be items of their own belongs to the block.
+        self.chunks.truncate(chunk + 1);
+    }
+
+    fn blank(&mut self, from: usize, to: usize) {
+        let bytes = self.text.as_bytes();
+        self.repairs.extend((from..to).filter(|&i| bytes[i] != b'\n' && bytes[i] != b'\r').map(|i| (i, b' ')));
+    }
+
+    /// A line no deeper than the head of a block whose lines stand deeper.
+    fn lose_blocks_left_by(&mut self, indent: usize) {
+        let left = |o: &Open| o.bracket == b'{' && indent <= o.indent && o.inner.is_some_and(|inner| inner > o.indent);
+        while self.open.last().is_some_and(left) {
+            self.lose_last(&format!("line {}", line_number(self.text, self.line_start)), self.line_start);
+        }
     }
 
     /// A `}` that lines up with an outer block shows that the inner ones lost theirs.
@@ -135,31 +276,74 @@ impl Scanner<'_> {
             return;
         }
         while !self.open.last().is_some_and(aligned) {
-            self.lose_last(&format!("line {}", line_number(self.text, at)));
+            self.lose_last(&format!("line {}", line_number(self.text, at)), self.line_start);
         }
     }
 
     /// A statement cannot begin inside parentheses: they were left open above.
     fn lose_parentheses_before(&mut self, words: &str) {
         while self.open.last().is_some_and(|o| o.bracket == b'(') && starts_statement(words) {
-            let last = self.open.last().map_or(0, |o| o.at);
-            self.lose_last(&format!("the end of line {}", line_number(self.text, last)));
+            self.lose_last("this line", self.line_start);
         }
     }
 
     /// What hangs open around the innermost bracket would be noise: only that one is reported.
     fn lose_all_open(&mut self, before: &str) {
-        self.lose_last(before);
+        let alone = self.open.len() <= 1;
+        self.lose_last(before, self.line_start);
+        self.broken |= !alone;
         self.open.clear();
     }
 
-    fn lose_last(&mut self, before: &str) {
-        let Some(open) = self.open.pop() else { return };
-        let (code, sign, partner) = if open.bracket == b'{' { ("E0102", '{', '}') } else { ("E0101", '(', ')') };
-        let owner = if open.bracket == b'{' { owner(self.text, open.at) } else { String::new() };
-        let message = format!("this `{sign}`{owner} is never closed");
-        let help = format!("a `{partner}` is missing before {before}");
-        self.report(Diagnostic::error(code, self.span(open.at, 1), message).label("opened here").help(help));
+    fn lose_last(&mut self, before: &str, limit: usize) {
+        let Some(open) = self.open.pop().filter(|_| !self.has_enough()) else { return };
+        if open.bracket == b'{' { self.lose_block(&open, before) } else { self.lose_parenthesis(&open, limit) }
+    }
+
+    /// The `}` belongs behind the last line of code.
+    fn lose_block(&mut self, open: &Open, before: &str) {
+        let end = self.code_end;
+        let message = format!("this `{{`{} is never closed", owner(self.text, open.at));
+        let indent = " ".repeat(open.indent);
+        let fault = Diagnostic::error("E0102", self.span(open.at, 1), message).label("opened here");
+        let help = format!("a `}}` is missing before {before}");
+        let one_line = !self.text[open.at..end.max(open.at)].contains('\n');
+        self.diagnostics.push(match one_line {
+            true => fault.fix(help, self.span(end, 0), " }"),
+            false => fault.fix(help, self.span(line_end(self.text, end), 0), format!("\n{indent}}}")),
+        });
+        match self.text.as_bytes().get(end..) {
+            // The next line goes on being one.
+            Some([b'\n', b' ' | b'\t', ..]) => self.repairs.extend([(end, b'}'), (end + 1, b'\n')]),
+            Some([byte, ..]) if byte.is_ascii_whitespace() => self.repairs.push((end, b'}')),
+            _ => self.broken = true,
+        }
+    }
+
+    /// The `)` belongs behind the last code before `limit`, and the statement is given up.
+    fn lose_parenthesis(&mut self, open: &Open, limit: usize) {
+        let at = if limit == self.line_start { self.code_end } else { self.text[..limit].trim_end().len() };
+        let start = self.text[..open.at].rfind('\n').map_or(0, |i| i + 1);
+        // A group is open behind its pattern.
+        let group = self.text[start..at].ends_with('{');
+        let at = if group { self.text[..at - 1].trim_end().len() } else { at };
+        let line = line_number(self.text, at);
+        let help = match group {
+            false if limit == self.line_start => format!("a `)` is missing before the end of line {line}"),
+            _ => "write the `)`".to_string(),
+        };
+        let fault = Diagnostic::error("E0101", self.span(open.at, 1), "this `(` is never closed").label("opened here");
+        self.diagnostics.push(fault.fix(help, self.span(at, 0), ")"));
+        let end = line_end(self.text, at);
+        self.broken |= group || limit != self.line_start;
+        self.lost.push(start..end);
+        self.blank(start, end);
+    }
+
+    fn has_enough(&mut self) -> bool {
+        let enough = self.diagnostics.len() >= ENOUGH;
+        self.broken |= enough;
+        enough
     }
 
     fn report(&mut self, diagnostic: Diagnostic) {
@@ -203,7 +387,7 @@ pub fn outside_strings(line: &str) -> impl Iterator<Item = (usize, u8)> {
 }
 
 /// `part pin {`: an item that cannot stand inside another.
-fn starts_block_item(words: &str) -> bool {
+pub fn starts_block_item(words: &str) -> bool {
     let end = words.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(words.len());
     let (first, rest) = words.split_at(end);
     let block = ["material", "part", "assembly", "station", "inspect", "train"];
@@ -220,6 +404,12 @@ fn starts_statement(words: &str) -> bool {
     (keyword.contains(&first) && rest.starts_with(|c: char| c.is_ascii_alphabetic() || c == '{'))
         || starts_block_item(words)
         || words.starts_with('}')
+}
+
+/// The end of the line that `at` stands on, without its line break.
+fn line_end(text: &str, at: usize) -> usize {
+    let rest = &text[at..];
+    at + rest.find('\n').map_or(rest.len(), |i| rest[..i].trim_end_matches('\r').len())
 }
 
 /// `of material `steel``, from the words in front of a brace.

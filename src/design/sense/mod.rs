@@ -15,7 +15,7 @@ mod tests;
 
 use super::model::{DimId, Expr, Part, Sense, Shape};
 use super::scope::Resolver;
-use crate::diag::{Diagnostic, Span};
+use crate::diag::{Applicability, Diagnostic, Fix, Span};
 use crate::iso;
 use crate::units::Range;
 use body::{Body, Leaf};
@@ -186,15 +186,13 @@ impl Resolver {
             "no one size of `{}` has most material: `{}` gains some where `{}` loses some",
             dim.name, gained.face, lost.face
         );
-        let help = format!(
-            "say which is meant: `{{ mmc {}, nominal {}, lmc {} }}`, or with mmc and lmc swapped",
-            shown(high),
-            shown(nominal),
-            shown(low)
-        );
+        let [low, nominal, high] = [low, nominal, high].map(shown);
+        let stated = |mmc: f64, lmc: f64| format!("{{ mmc {mmc}, nominal {nominal}, lmc {lmc} }}");
+        let [larger, smaller] = [stated(high, low), stated(low, high)];
         let diagnostic = Diagnostic::warning("W0311", dim.span, message)
             .label("MMC and LMC are taken as its nominal size")
-            .help(help);
+            .suggest("most material when it is largest", dim.span, larger)
+            .suggest("most material when it is smallest", dim.span, smaller);
         self.report(match gained.span == lost.span {
             true => diagnostic.also(gained.span, "gains material and loses some when it grows"),
             false => diagnostic
@@ -208,9 +206,14 @@ impl Resolver {
         let (body, extreme) = if dim.sense == Sense::Internal { ("a hole", "smallest") } else { ("a body", "largest") };
         let message =
             format!("{body} has most material when it is {extreme}: mmc {mmc} and lmc {lmc} are the wrong way round");
-        let help = format!("swap them: `{{ mmc {lmc}, nominal {}, lmc {mmc} }}`", dim.range.nominal);
-        let span = dim.span;
-        self.report(Diagnostic::error("E0305", span, message).label("against the sense of the feature").help(help));
+        let fault = Diagnostic::error("E0305", dim.span, message).label("against the sense of the feature");
+        self.report(match self.remarks[id].state_words {
+            Some([first, second]) => {
+                let fix = Fix::new("swap them", Applicability::MachineApplicable);
+                fault.with_fix(fix.edit(first, "lmc").edit(second, "mmc"))
+            }
+            None => fault.help("swap them"),
+        });
     }
 
     fn doubt_class(&mut self, class: &str, span: crate::diag::Span, sense: Sense) {
@@ -221,10 +224,6 @@ impl Resolver {
             _ => return,
         };
         let message = format!("`{class}` is the class of {kind}, and this is the size of {used}");
-        self.report(
-            Diagnostic::warning("W0304", span, message)
-                .label(format!("used for {used}"))
-                .help(format!("did you mean `{meant}`?")),
-        );
+        self.report(Diagnostic::warning("W0304", span, message).label(format!("used for {used}")).meant(span, &meant));
     }
 }

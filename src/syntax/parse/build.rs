@@ -14,10 +14,20 @@ pub struct Builder {
 type Node<'i> = Pair<'i, Rule>;
 
 impl Builder {
+    /// The first `len` bytes of the item.
+    pub fn whole(&self, len: usize) -> Span {
+        self.within(0, len)
+    }
+
+    /// A stretch of the item.
+    pub fn within(&self, start: usize, end: usize) -> Span {
+        Span { file: self.file, start: (self.offset + start) as u32, end: (self.offset + end) as u32 }
+    }
+
     fn span(&self, pair: &Node) -> Span {
-        let span = pair.as_span();
-        let [start, end] = [span.start(), span.end()].map(|at| (at + self.offset) as u32);
-        Span { file: self.file, start, end }
+        // A rule that ends with something optional takes the blanks before it.
+        let (start, len) = (pair.as_span().start(), pair.as_str().trim_end().len());
+        self.within(start, start + len)
     }
 
     /// The statements inside a pair, and what stands behind the last.

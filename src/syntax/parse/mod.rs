@@ -8,8 +8,9 @@ mod words;
 
 use super::ast::{File, Gap, Line};
 use super::faults::{self, Fault};
-use super::scan::{scan, strip_comment};
-use crate::diag::{Diagnostic, Span};
+use super::scan::{Scanned, scan, strip_comment};
+use super::{heads, letters};
+use crate::diag::{self, Diagnostic, Fix, Span};
 use build::Builder;
 use pest::Parser;
 use std::borrow::Cow;
@@ -30,35 +31,104 @@ struct Grammar;
 pub fn parse(text: &str, file: u32) -> (File, Vec<Diagnostic>) {
     if text.len() > MAX_TEXT {
         let message = format!("this file has {} bytes, the limit is {MAX_TEXT}", text.len());
-        return (File::default(), vec![Diagnostic::error("E0101", Span { file, start: 0, end: 0 }, message)]);
+        let lost = vec![Span { file, start: 0, end: text.len() as u32 }];
+        let fault = Diagnostic::error("E0101", Span { file, start: 0, end: 0 }, message);
+        return (File { lost, ..File::default() }, vec![fault]);
     }
-    let (chunks, mut diagnostics) = scan(text, file);
-    let mut tree = File::default();
-    for chunk in chunks.iter().filter(|chunk| !chunk.broken) {
+    let letters::Cleaned { text: clean, mut diagnostics, lost } = letters::clean(text, file);
+    let (clean, found) = heads::mended(clean, file);
+    diagnostics.extend(found);
+    let scanned = scan(&clean, file);
+    diagnostics.extend(checked(scanned.diagnostics.clone(), &clean));
+    let clean = repaired(clean, &scanned);
+    let mut tree = File { lost, ..File::default() };
+    tree.lost.extend(scanned.lost.iter().map(|r| Span { file, start: r.start as u32, end: r.end as u32 }));
+    let mut end = 0;
+    for chunk in &scanned.chunks {
         let builder = Builder { file, offset: chunk.start };
-        tree.lines.extend(parse_chunk(&text[chunk.start..chunk.end], &builder, &mut diagnostics));
+        end = chunk.end;
+        if chunk.broken || diagnostics.len() >= MAX_FAULTS {
+            tree.lost.push(builder.whole(chunk.end - chunk.start));
+            continue;
+        }
+        tree.lines.extend(parse_chunk(&clean[chunk.start..chunk.end], &builder, &mut diagnostics, &mut tree.lost));
     }
-    tree.end = parse_tail(&text[chunks.last().map_or(0, |chunk| chunk.end)..]);
+    tree.end = parse_tail(&clean[end..]);
     diagnostics.sort_by_key(|d| d.labels[0].span.start);
     diagnostics.truncate(MAX_FAULTS);
     (tree, diagnostics)
 }
 
-fn parse_chunk(text: &str, builder: &Builder, diagnostics: &mut Vec<Diagnostic>) -> Option<Line> {
-    let mut text = Cow::Borrowed(text.strip_prefix('\u{feff}').unwrap_or(text));
+/// Keeps the fixes of brackets that leave fewer of them unpaired.
+fn checked(mut diagnostics: Vec<Diagnostic>, text: &str) -> Vec<Diagnostic> {
+    let count = diagnostics.len();
+    // Nobody pastes the help of a text as broken as that.
+    let hopeless = count > MAX_FAULTS_PER_ITEM && text.len() > 1 << 16 || count > MAX_FAULTS;
+    for diagnostic in &mut diagnostics {
+        if hopeless {
+            diagnostic.fixes.clear();
+        }
+        let helps = |fix: &Fix| {
+            let (mended, made) = diag::apply(text, fix.edits.first().map_or(0, |e| e.span.file), [fix]);
+            !made.is_empty() && scan(&mended, 0).diagnostics.len() < count
+        };
+        diagnostic.fixes.retain(helps);
+    }
+    diagnostics
+}
+
+fn repaired(text: String, scanned: &Scanned) -> String {
+    let mut bytes = text.into_bytes();
+    scanned.repairs.iter().for_each(|&(at, byte)| bytes[at] = byte);
+    // Blanks may have been put over whole characters only.
+    String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned())
+}
+
+fn parse_chunk(text: &str, builder: &Builder, diagnostics: &mut Vec<Diagnostic>, lost: &mut Vec<Span>) -> Option<Line> {
+    let mut text = Cow::Borrowed(text);
     for _ in 0..MAX_FAULTS_PER_ITEM {
         let error = match Grammar::parse(Rule::chunk, &text) {
             Ok(mut pairs) => return builder.lines(pairs.next()?).0.pop(),
             Err(error) => error,
         };
         let fault = fault(&error);
-        diagnostics.push(faults::describe(&text, &fault, builder.file, builder.offset));
-        text = Cow::Owned(without_statement(&text, fault.at)?);
+        let mut diagnostic = faults::describe(&text, &fault, builder.file, builder.offset);
+        diagnostic.fixes.retain(|fix| gets_further(&text, fix, &fault, builder));
+        diagnostics.push(diagnostic);
+        let (start, end) = statement_at(&text, fault.at);
+        let Some(rest) = without_statement(&text, start, end) else {
+            lost.push(builder.whole(text.len()));
+            return None;
+        };
+        lost.push(builder.within(start, end));
+        text = Cow::Owned(rest);
         if text.lines().all(|line| strip_comment(line).trim().is_empty()) {
             return None;
         }
     }
+    lost.push(builder.whole(text.len()));
     None
+}
+
+/// Whether the parser comes further with a fix: its help has to compile when pasted.
+fn gets_further(text: &str, fix: &Fix, fault: &Fault, builder: &Builder) -> bool {
+    let shifted = |edit: &diag::Edit| {
+        let span = Span {
+            start: edit.span.start - builder.offset as u32,
+            end: edit.span.end - builder.offset as u32,
+            ..edit.span
+        };
+        diag::Edit { span, text: edit.text.clone() }
+    };
+    let local = Fix { edits: fix.edits.iter().map(shifted).collect(), ..fix.clone() };
+    let (mended, made) = diag::apply(text, builder.file, [&local]);
+    let behind = |edit: &diag::Edit| (edit.span.start as usize + edit.text.len()).max(fault.at);
+    let least = local.edits.iter().map(behind).max().unwrap_or(fault.at);
+    !made.is_empty()
+        && match Grammar::parse(Rule::chunk, &mended) {
+            Ok(_) => true,
+            Err(error) => self::fault(&error).at > least,
+        }
 }
 
 /// The comments and blank lines behind the last item.
@@ -86,12 +156,11 @@ fn fault(error: &pest::error::Error<Rule>) -> Fault {
     Fault { at, expected }
 }
 
-/// The text with the statement at `at` replaced by spaces; `None` if that would tear a block open.
-fn without_statement(text: &str, at: usize) -> Option<String> {
-    let (start, end) = statement_at(text, at);
+/// The text with a statement replaced by spaces; `None` if that would tear a block open.
+fn without_statement(text: &str, start: usize, end: usize) -> Option<String> {
     let statement = &text[start..end];
     let code: String = statement.lines().map(strip_comment).collect();
-    if code.trim().is_empty() || code.matches('{').count() != code.matches('}').count() || code.contains('"') {
+    if code.trim().is_empty() || code.matches('{').count() != code.matches('}').count() {
         return None;
     }
     let blank: String = statement.bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }).collect();
