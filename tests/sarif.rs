@@ -11,6 +11,9 @@ use serde_json::{Map, Value, json};
 use std::fs;
 use std::path::PathBuf;
 
+/// What spoils a log.
+type Damage = fn(&mut Value);
+
 fn schema() -> Value {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/sarif-2.1.0.schema.json");
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
@@ -45,7 +48,7 @@ fn logs_of_many_faults_keep_to_the_schema() {
 fn the_validator_refuses_what_the_schema_does() {
     let schema = schema();
     let log = || -> Value { serde_json::from_str(&sarif([])).unwrap() };
-    let damage: [(&str, fn(&mut Value)); 7] = [
+    let damages: [(&str, Damage); 7] = [
         ("required", |l| drop(l.as_object_mut().unwrap().remove("version"))),
         ("enum", |l| l["version"] = json!("2.0.0")),
         ("type", |l| l["runs"][0]["results"] = json!(3)),
@@ -57,7 +60,7 @@ fn the_validator_refuses_what_the_schema_does() {
             l["runs"][0]["tool"]["driver"]["rules"] = json!([rule, rule]);
         }),
     ];
-    for (keyword, damage) in damage {
+    for (keyword, damage) in damages {
         let mut log = log();
         damage(&mut log);
         let found = faults(&schema, &schema, &log, "log");

@@ -64,7 +64,7 @@ pub fn measures(design: &Design, solids: &[Arc<Solid>]) -> (Vec<Measured>, Vec<D
                 found.push(measured);
                 faults.extend(fault);
             }
-            Err(fault) => faults.push(fault),
+            Err(fault) => faults.push(*fault),
         }
     }
     (found, faults)
@@ -162,17 +162,17 @@ impl<'a> Distance<'a> {
         solids: &[Arc<Solid>],
         poses: &[Isometry3<f64>],
         measure: &Measure,
-    ) -> Result<Self, Diagnostic> {
+    ) -> Result<Self, Box<Diagnostic>> {
         let side = |path: &FacePath| side(design, &solids[path.component], path);
         let sides = [side(&measure.from)?, side(&measure.to)?];
         let joint = Joint::new(design, [measure.from.component, measure.to.component], poses);
         let middle = middle(&solids[measure.to.component], &measure.to.face);
         let mut distance = Distance { design, joint, sides, middle, sign: 1.0 };
         let nominal = design.nominal();
-        let no_distance = || no_distance(measure, "one of them is no surface at nominal size");
+        let no_distance = || Box::new(no_distance(measure, "one of them is no surface at nominal size"));
         let (from, to, _) = distance.data(&nominal).ok_or_else(no_distance)?;
         if !from.is_parallel(&to) {
-            return Err(no_distance_between(measure, &from, &to));
+            return Err(Box::new(no_distance_between(measure, &from, &to)));
         }
         if distance.at(&nominal) < 0.0 {
             distance.sign = -1.0;
@@ -278,14 +278,14 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// The face a path names; E0509 if the solid shows none on that surface.
-fn side(design: &Design, solid: &Solid, path: &FacePath) -> Result<Side, Diagnostic> {
+fn side(design: &Design, solid: &Solid, path: &FacePath) -> Result<Side, Box<Diagnostic>> {
     let part = &design.parts[design.components[path.component].part];
     let nominal = design.nominal();
     let side = Side::new(part, &path.face, &nominal);
     let shown = side.as_ref().and_then(|s| s.at(&nominal)).is_some_and(|surface| shows(solid, &path.face, &surface));
     match side {
         Some(side) if shown => Ok(side),
-        _ => Err(no_face(&part.name, solid, path)),
+        _ => Err(Box::new(no_face(&part.name, solid, path))),
     }
 }
 

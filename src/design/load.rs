@@ -168,7 +168,7 @@ impl Loader<'_> {
             .label("another version of the language")
             .help(format!("write `gonogo {VERSION}`, or use a compiler that knows gonogo {version}")),
             // Whatever stands there was reported by the parser.
-            (None, _) if self.diagnostics.iter().any(|d| d.labels[0].span.file == file) => return,
+            (None, first) if lost_before(tree, first.unwrap_or(Span { start: u32::MAX, ..start })) => return,
             (None, first) => Diagnostic::error("E0105", first.unwrap_or(start), "the version line is missing")
                 .label("before this")
                 .fix(
@@ -199,6 +199,11 @@ impl Loader<'_> {
         }
         found
     }
+}
+
+/// Whether something that could not be read stands above a statement.
+fn lost_before(tree: &ast::File, first: Span) -> bool {
+    tree.lost.iter().any(|lost| lost.start < first.start)
 }
 
 fn as_use(line: &ast::Line) -> Option<&ast::Name> {

@@ -332,7 +332,14 @@ impl Scanner<'_> {
             false if limit == self.line_start => format!("a `)` is missing before the end of line {line}"),
             _ => "write the `)`".to_string(),
         };
-        let fault = Diagnostic::error("E0101", self.span(open.at, 1), "this `(` is never closed").label("opened here");
+        let mut fault =
+            Diagnostic::error("E0101", self.span(open.at, 1), "this `(` is never closed").label("opened here");
+        // What places a shape stands behind its arguments. Which of the fixes it is, the parser finds out.
+        for word in ["on", "at", "turn"] {
+            for (i, _) in self.text[open.at..at].match_indices(&format!(" {word} ")) {
+                fault = fault.fix(format!("a `)` is missing before `{word}`"), self.span(open.at + i, 0), ")");
+            }
+        }
         self.diagnostics.push(fault.fix(help, self.span(at, 0), ")"));
         let end = line_end(self.text, at);
         self.broken |= group || limit != self.line_start;

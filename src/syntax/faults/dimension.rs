@@ -40,7 +40,7 @@ fn tolerance_slip(text: &str, at: usize) -> Option<Slip> {
             let text = format!("{size} ±{}", &tolerance[2..]);
             Some(whole(slip("E0104", format!("`{}` is no sign", &tolerance[..2]), "not a tolerance"), text))
         }
-        [size, upper, lower] if is_signed(upper) && is_signed(lower) => {
+        [size, upper, lower] if is_signed(upper) && (is_signed(lower) || *lower == "0") => {
             let (upper, lower) =
                 if upper.starts_with('-') && lower.starts_with('+') { (lower, upper) } else { (upper, lower) };
             let text = format!("{size} {upper}/{lower}");
@@ -191,9 +191,12 @@ fn is_fit_pair(word: &str) -> bool {
 /// Operands joined by operators, and nothing else.
 fn is_bare_sum(dim: &str) -> bool {
     let operator = |c: char| matches!(c, '+' | '-' | '*' | '/');
+    // A number or a name, and perhaps a unit.
     let operand = |s: &str| {
-        let s = s.trim();
-        !s.is_empty() && s.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.' | ' '))
+        let mut words = s.split_whitespace();
+        let plain = |w: &str| w.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.'));
+        let unit = |w: &str| w.chars().all(char::is_alphabetic);
+        words.next().is_some_and(plain) && words.next().is_none_or(unit) && words.next().is_none()
     };
     let dim = dim.strip_prefix('-').unwrap_or(dim);
     dim.contains(operator) && dim.split(operator).all(operand)

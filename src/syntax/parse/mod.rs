@@ -59,7 +59,7 @@ pub fn parse(text: &str, file: u32) -> (File, Vec<Diagnostic>) {
     (tree, diagnostics)
 }
 
-/// Keeps the fixes of brackets that leave fewer of them unpaired.
+/// Keeps the fix of each bracket that leaves fewer of them unpaired and a statement that can be read.
 fn checked(mut diagnostics: Vec<Diagnostic>, text: &str) -> Vec<Diagnostic> {
     let count = diagnostics.len();
     // Nobody pastes the help of a text as broken as that.
@@ -70,11 +70,29 @@ fn checked(mut diagnostics: Vec<Diagnostic>, text: &str) -> Vec<Diagnostic> {
         }
         let helps = |fix: &Fix| {
             let (mended, made) = diag::apply(text, fix.edits.first().map_or(0, |e| e.span.file), [fix]);
-            !made.is_empty() && scan(&mended, 0).diagnostics.len() < count
+            let scanned = scan(&mended, 0);
+            let pairs = !made.is_empty() && scanned.diagnostics.len() < count;
+            pairs && is_readable(&repaired(mended, &scanned), &scanned, fix)
         };
-        diagnostic.fixes.retain(helps);
+        let best = diagnostic.fixes.iter().find(|fix| helps(fix)).cloned();
+        diagnostic.help = best.as_ref().map(|fix| fix.title.clone()).or(diagnostic.help.take());
+        diagnostic.fixes = best.into_iter().collect();
     }
     diagnostics
+}
+
+/// Whether the statement that a fix has changed parses, as far as its item does up to there.
+fn is_readable(mended: &str, scanned: &Scanned, fix: &Fix) -> bool {
+    let Some(at) = fix.edits.first().map(|edit| edit.span.start as usize) else { return false };
+    let Some(chunk) = scanned.chunks.iter().find(|chunk| (chunk.start..=chunk.end).contains(&at)) else { return true };
+    let text = &mended[chunk.start..chunk.end];
+    match Grammar::parse(Rule::chunk, text) {
+        Err(error) if !chunk.broken => {
+            let (start, end) = statement_at(text, at.saturating_sub(chunk.start));
+            !(start..end).contains(&fault(&error).at)
+        }
+        _ => true,
+    }
 }
 
 fn repaired(text: String, scanned: &Scanned) -> String {
