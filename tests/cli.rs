@@ -205,7 +205,7 @@ fn warnings_can_be_denied_and_allowed_by_code() {
 fn fixes_are_made_until_none_is_left() {
     let folder = Folder::new("fixed");
     let broken =
-        spec().replace("gonogo 1\n", "").replace("h = through)", "h = through").replace("40 ±0.1", "40,5 ±0,1");
+        spec().replace("gonogo 1\n\n", "").replace("h = through)", "h = through").replace("40 ±0.1", "40,5 ±0,1");
     folder
         .file("plate.gng", broken.replace("z = 0 ±0.05", "z = 0 ±0.05;").replace("6 +0.012/0", "6 +0.012"))
         .file("other.gng", "gonogo 1;\n");
@@ -213,9 +213,10 @@ fn fixes_are_made_until_none_is_left() {
     let made = ["mended E0105", "mended E0101: write `40.5 ±0.1`", "a `)` is missing before `on`", "remove the `;`"];
     run.expect(1, &made);
     // What could mean several things is left to people.
-    assert_eq!(folder.read("plate.gng"), spec().replace("40 ±0.1", "40.5 ±0.1").replace("6 +0.012/0", "6 +0.012"));
+    let spec = spec().replace("gonogo 1\n\n", "gonogo 1\n");
+    assert_eq!(folder.read("plate.gng"), spec.replace("40 ±0.1", "40.5 ±0.1").replace("6 +0.012/0", "6 +0.012"));
     assert_eq!((folder.read("other.gng").as_str(), folder.names().len()), ("gonogo 1;\n", 2));
-    let good = folder.file("good.gng", spec()).run(&["check", "--fix", "good.gng"]);
+    let good = folder.file("good.gng", spec).run(&["check", "--fix", "good.gng"]);
     assert_eq!(good.expect(0, &[]).err, "");
 }
 
@@ -464,6 +465,36 @@ fn junit_is_one_report_for_all() {
     assert!(run.out.starts_with("<?xml") && run.out.trim_end().ends_with("</testsuites>"), "{}", run.out);
     run.expect(2, &[r#"tests="6" failures="1" errors="2""#]);
     run.expect(2, &[r#"<testcase classname="good.png" name="pin[1]"/>"#, r#"name="pin[1]"><failure type="no-go""#]);
+    let suites = elements(&run.out);
+    assert_eq!(suites.iter().filter(|(path, _)| path == "testsuites/testsuite").count(), 3);
+    for (path, attributes) in &suites {
+        let told = |key: &str| attributes.split_once(&format!("{key}=\"")).map(|(_, v)| v.split('"').next().unwrap());
+        match path.as_str() {
+            "testsuites" => assert_eq!((told("tests"), told("failures"), told("errors")), (Some("6"), Some("1"), Some("2"))),
+            "testsuites/testsuite" => assert_eq!((told("tests"), told("skipped")), (Some("2"), Some("0"))),
+            "testsuites/testsuite/testcase" => assert!(["pin[1]", "pin[2]"].contains(&told("name").unwrap())),
+            other => assert!(other.ends_with("testcase/failure") || other.ends_with("testcase/error"), "{other}"),
+        }
+    }
+}
+
+/// The elements of an XML text with their paths and attributes; fails where a tag closes what is not open.
+fn elements(xml: &str) -> Vec<(String, String)> {
+    let (mut open, mut found) = (Vec::new(), Vec::new());
+    for tag in xml.split('<').skip(1).map(|t| t.split_once('>').expect("a tag ends").0).filter(|t| !t.starts_with('?')) {
+        if let Some(name) = tag.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(name));
+            continue;
+        }
+        let (name, attributes) = tag.trim_end_matches('/').split_once(' ').unwrap_or((tag, ""));
+        open.push(name);
+        found.push((open.join("/"), attributes.to_string()));
+        if tag.ends_with('/') {
+            open.pop();
+        }
+    }
+    assert!(open.is_empty(), "{open:?}");
+    found
 }
 
 #[test]
