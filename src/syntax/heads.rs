@@ -30,7 +30,7 @@ pub fn mended(text: String, file: u32) -> (String, Vec<Diagnostic>) {
                     false => fault.help("move it up"),
                 });
                 (bytes[end], bytes[brace]) = (b'{', b' ');
-            } else if blank && head.is_bare_head() && line.indent > head.indent {
+            } else if blank && head.is_bare_head() && line.indent > head.indent && head.could_hold(&line) {
                 let words = head.code.trim();
                 let fix = Fix::new(format!("write `{words} {{`"), Applicability::MachineApplicable);
                 diagnostics.push(
@@ -84,6 +84,13 @@ impl Line<'_> {
         let inner = INNER.contains(&first) && !words[first.len()..].trim_start().starts_with('=');
         !words.contains(['{', '}']) && (self.indent == 0 && starts_block_item(words) || self.indent > 0 && inner)
     }
+
+    /// Whether a line may stand in the block. A `place` needs none, and what stands in it gives one of its fields.
+    fn could_hold(&self, line: &Line) -> bool {
+        let field = line.code.trim().split_once('=').map(|(name, _)| name.trim());
+        let is_field = field.is_some_and(|name| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphabetic()));
+        !self.code.trim_start().starts_with("place") || is_field
+    }
 }
 
 #[cfg(test)]
@@ -113,9 +120,13 @@ mod tests {
 
     #[test]
     fn what_may_stand_without_a_block_does() {
-        for text in
-            ["part p {\n    outline = o\n      x\n", "    place a on b\n    root c\n", "a = b(\n{\n", "part p // {\n"]
-        {
+        for text in [
+            "part p {\n    outline = o\n      x\n",
+            "    place a on b\n    root c\n",
+            "  place a on b\n    place c = 2x d on b\n",
+            "a = b(\n{\n",
+            "part p // {\n",
+        ] {
             assert_eq!(both(text), (text.to_string(), text.to_string()));
         }
     }
