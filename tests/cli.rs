@@ -461,9 +461,11 @@ fn junit_is_one_report_for_all() {
     let suites = elements(&run.out);
     assert_eq!(suites.iter().filter(|(path, _)| path == "testsuites/testsuite").count(), 3);
     for (path, attributes) in &suites {
-        let told = |key: &str| attributes.split_once(&format!("{key}=\"")).map(|(_, v)| v.split('"').next().unwrap());
+        let told = |key: &str| attributes.split_once(&format!(" {key}=\"")).map(|(_, v)| v.split('"').next().unwrap());
         match path.as_str() {
-            "testsuites" => assert_eq!((told("tests"), told("failures"), told("errors")), (Some("6"), Some("1"), Some("2"))),
+            "testsuites" => {
+                assert_eq!((told("tests"), told("failures"), told("errors")), (Some("6"), Some("1"), Some("2")))
+            }
             "testsuites/testsuite" => assert_eq!((told("tests"), told("skipped")), (Some("2"), Some("0"))),
             "testsuites/testsuite/testcase" => assert!(["pin[1]", "pin[2]"].contains(&told("name").unwrap())),
             other => assert!(other.ends_with("testcase/failure") || other.ends_with("testcase/error"), "{other}"),
@@ -474,14 +476,15 @@ fn junit_is_one_report_for_all() {
 /// The elements of an XML text with their paths and attributes; fails where a tag closes what is not open.
 fn elements(xml: &str) -> Vec<(String, String)> {
     let (mut open, mut found) = (Vec::new(), Vec::new());
-    for tag in xml.split('<').skip(1).map(|t| t.split_once('>').expect("a tag ends").0).filter(|t| !t.starts_with('?')) {
+    for tag in xml.split('<').skip(1).map(|t| t.split_once('>').expect("a tag ends").0).filter(|t| !t.starts_with('?'))
+    {
         if let Some(name) = tag.strip_prefix('/') {
             assert_eq!(open.pop(), Some(name));
             continue;
         }
         let (name, attributes) = tag.trim_end_matches('/').split_once(' ').unwrap_or((tag, ""));
         open.push(name);
-        found.push((open.join("/"), attributes.to_string()));
+        found.push((open.join("/"), format!(" {attributes}")));
         if tag.ends_with('/') {
             open.pop();
         }

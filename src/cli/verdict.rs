@@ -74,7 +74,7 @@ fn suite(outcome: &Outcome, cases: &[(String, Case)]) -> String {
     text + "  </testsuite>\n"
 }
 
-/// The attributes of a suite.
+/// The attributes of a suite. Seconds have three decimals at most, as the schema of the Jenkins plug-in wants them.
 fn counts<'a>(cases: impl Iterator<Item = &'a (String, Case)>, seconds: f64, with_skipped: bool) -> String {
     let (mut tests, mut failures, mut errors, mut skipped) = (0, 0, 0, 0);
     for (_, case) in cases {
@@ -87,7 +87,7 @@ fn counts<'a>(cases: impl Iterator<Item = &'a (String, Case)>, seconds: f64, wit
         }
     }
     let skipped = if with_skipped { format!(" skipped=\"{skipped}\"") } else { String::new() };
-    format!("tests=\"{tests}\" failures=\"{failures}\" errors=\"{errors}\"{skipped} time=\"{seconds:.6}\"")
+    format!("tests=\"{tests}\" failures=\"{failures}\" errors=\"{errors}\"{skipped} time=\"{seconds:.3}\"")
 }
 
 /// A case for every component watched, and for what else was found; trouble concerns them all.

@@ -80,7 +80,7 @@ impl Book {
         let changed: Vec<usize> = fix.edits.iter().map(|e| line(text, e.span.start)).collect();
         let rest = |d: &Diagnostic| changed.contains(&line(&mended, d.labels[0].span.start));
         let more = |d: &Diagnostic| count(&after, d) > count(before, d);
-        let new = |d: &&Diagnostic| d.is_error() && more(d) && !(hidden && !of_text(d)) && !rest(d);
+        let new = |d: &&Diagnostic| d.is_error() && more(d) && (!hidden || of_text(d)) && !rest(d);
         match after.iter().find(new) {
             None if gone && !made.is_empty() => Ok(()),
             _ => Err(format!(
