@@ -300,9 +300,9 @@ fn check_looks_again_when_a_used_file_changes() {
     let (rounds, code) = watch(&folder, &args, |round, _| match round {
         0 => folder.edit(PIN, "material = white", "material = whote"),
         1 => fs::remove_file(folder.0.join(PIN)).unwrap(),
-        2 => {
-            fs::copy(folder::root().join("docs/recipes/build_script").join(PIN), folder.0.join(PIN)).map(drop).unwrap()
-        }
+        2 => fs::copy(folder::root().join("docs/src/recipes/build_script").join(PIN), folder.0.join(PIN))
+            .map(drop)
+            .unwrap(),
         _ => {}
     });
     let starts = ["round 1: no faults in", "round 2: 1 error", "round 3: ", "round 4: no faults in"];

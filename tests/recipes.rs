@@ -1,4 +1,4 @@
-//! The recipes in `docs/recipes`, each run by its own tool where that is installed: the first run makes a model, the second
+//! The recipes in `docs/src/recipes`, each run by its own tool where that is installed: the first run makes a model, the second
 //! does nothing, and a change of a used file makes it anew.
 
 #![cfg(feature = "cli")]
@@ -11,7 +11,7 @@ use std::time::{Duration, SystemTime};
 
 fn with_recipe(name: &str, recipe: &str, file: &str) -> Folder {
     let folder = Folder::with_specs(name);
-    fs::copy(root().join("docs/recipes").join(recipe).join(file), folder.0.join(file)).unwrap();
+    fs::copy(root().join("docs/src/recipes").join(recipe).join(file), folder.0.join(file)).unwrap();
     folder
 }
 
@@ -115,7 +115,7 @@ fn the_github_workflow_says_what_gonogo_understands() {
 #[test]
 fn pre_commit() {
     let hooks = fs::read_to_string(root().join(".pre-commit-hooks.yaml")).unwrap();
-    let config = fs::read_to_string(root().join("docs/recipes/pre-commit/.pre-commit-config.yaml")).unwrap();
+    let config = fs::read_to_string(root().join("docs/src/recipes/pre-commit/.pre-commit-config.yaml")).unwrap();
     let ids = |text: &str| -> Vec<String> {
         text.lines().filter_map(|l| l.trim().strip_prefix("- id: ")).map(String::from).collect()
     };

@@ -387,6 +387,13 @@ pub const KEYWORDS: &[Keyword] = &[
         "an outline, drawn from corner to corner, for `prism` and `revolve`",
     ),
     word(
+        "part",
+        "table",
+        "table ${1:d} (${2:h}) {\n    row ${3:6} = (${4:10})\n}",
+        "sizes of a family of parts: a row for each value of a parameter, a column for each name",
+    ),
+    word("table", "row", "row ${1:6} = ($0)", "one size: the parameter's value, and what each column is then"),
+    word(
         "feature",
         "group",
         "group {\n    add ${1:name} = $0\n}",

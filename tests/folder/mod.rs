@@ -56,7 +56,7 @@ impl Folder {
         let folder = Folder::empty(name);
         fs::create_dir_all(folder.0.join("specs/parts")).unwrap();
         for file in [SPEC, PIN] {
-            folder.write(file, &fs::read_to_string(root().join("docs/recipes/build_script").join(file)).unwrap());
+            folder.write(file, &fs::read_to_string(root().join("docs/src/recipes/build_script").join(file)).unwrap());
         }
         folder
     }
