@@ -398,7 +398,58 @@ fn completion_knows_the_place() {
 fn completion_offers_files_to_use() {
     let mut editor = two_specs();
     editor.open("/w/one.gng", "gonogo 1\nuse \"par\n");
-    assert_eq!(editor.complete("/w/one.gng", "gonogo 1\nuse \"par".len()), ["parts/pin.gng", "two.gng"]);
+    let found = editor.complete("/w/one.gng", "gonogo 1\nuse \"par".len());
+    assert_eq!(found[..2], ["parts/pin.gng", "two.gng"]);
+    assert!(
+        found[2..].iter().all(|name| name.starts_with("std/")) && found.contains(&"std/iso2338".to_string()),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn families_and_their_members_are_known() {
+    let mut editor = Editor::new();
+    let spec = "gonogo 1\nuse \"std/iso2338\"\nmaterial m {\n    kind = matt\n}\npart post(d, h) {\n    material = m\n    table d (size) {\n        row 6 = (6 m6)\n        row 8 = (8 m6)\n    }\n    add body = cylinder(d = size, h = h)\n}\npart a = post(d = 6, h = 20)\npart pin = iso2338(d = 6, l = 20)\nassembly t {\n    root a\n    place pin on a.body {\n        z = 20\n    }\n}\nstation s {\n    light r = room()\n}\n";
+    editor.open("/w/a.gng", spec);
+    let shown = editor.shown("/w/a.gng");
+    assert!(shown.iter().all(|d| d["severity"] != 1), "{shown:#?}");
+    for (at, line) in [
+        ("post(d = 6", "part post(d, h) {"),
+        ("body {\n        z", "add body = cylinder(d = size, h = h)"),
+        ("size, h = h)", "table d (size) {"),
+        ("d = 6, h", "part post(d, h) {"),
+        ("a.body {", "root a"),
+    ] {
+        assert_eq!(editor.definition_line("/w/a.gng", at), line, "{at}");
+    }
+    assert!(
+        editor.hover("/w/a.gng", "iso2338(d").contains("Parallel pins"),
+        "{}",
+        editor.hover("/w/a.gng", "iso2338(d")
+    );
+    assert!(editor.hover("/w/a.gng", "6 m6").contains("6.004 … 6.012 mm"), "{}", editor.hover("/w/a.gng", "6 m6"));
+    let renamed = editor.rename("/w/a.gng", "post(d = 6", "column").unwrap();
+    assert!(
+        renamed["/w/a.gng"].contains("part column(d, h) {") && renamed["/w/a.gng"].contains("part a = column(d = 6")
+    );
+    let said = editor.rename("/w/a.gng", "iso2338(d", "x").unwrap_err();
+    assert!(said.contains("not yours to change"), "{said}");
+    editor.open("/w/a.gng", &spec.replace("part pin = iso2338(d = 6, l = 20)", "part pin = iso2338(d = "));
+    let at = spec.find("iso2338(d = ").unwrap() + "iso2338(d = ".len();
+    let found = editor.complete("/w/a.gng", at);
+    assert!(found.contains(&"2.5".to_string()) && found.contains(&"50".to_string()), "{found:?}");
+}
+
+#[test]
+fn fixes_are_code_actions() {
+    let mut editor = Editor::new();
+    let spec = "gonogo 1\nlet ab = 6 // ±🔩\nlet c = ab + 2\n";
+    editor.open("/w/a.gng", spec);
+    let actions = editor.actions("/w/a.gng", "ab + 2");
+    let fix = actions.iter().find(|a| a["kind"] == "quickfix").unwrap_or_else(|| panic!("{actions:#?}"));
+    assert_eq!((&fix["isPreferred"], &fix["diagnostics"][0]["code"]), (&json!(true), &json!("E0103")));
+    let edits = fix["edit"]["changes"]["file:///w/a.gng"].as_array().unwrap();
+    assert!(editor::applied(spec, edits).contains("let c = (ab + 2)\n"));
 }
 
 #[test]

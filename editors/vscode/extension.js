@@ -17,10 +17,10 @@ async function start() {
   await client.start();
 }
 
-// `gonogo:/E0305.md` is the page of E0305.
+// `gonogo:/E0305.md` is the page of E0305, `gonogo:/std/iso2338.gng` a file of the parts library.
 const pages = {
   async provideTextDocumentContent(uri) {
-    const code = uri.path.replace(/^\//, "").replace(/\.md$/, "");
+    const code = uri.path.replace(/^\//, "").replace(/\.(md|gng)$/, "");
     return client.sendRequest("workspace/executeCommand", { command: "gonogo.explain", arguments: [code] });
   },
 };

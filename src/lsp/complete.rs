@@ -5,6 +5,7 @@ use super::index::{Index, Kind, SymbolId};
 use super::project::Project;
 use super::text::Text;
 use super::words::{Argument, GENERAL, HOLES, KEYWORDS, OWNERS, Owner, Role, SHAFTS, Takes, UNITS};
+use crate::syntax::ast::Stmt;
 use crate::syntax::parse;
 use lsp_types::{CompletionItem, CompletionItemKind, CompletionTextEdit, InsertTextFormat, TextEdit};
 use std::borrow::Cow;
@@ -95,6 +96,7 @@ impl Proposals<'_> {
             ("file", ["tolerances", ..]) => self.plain(GENERAL, CompletionItemKind::ENUM_MEMBER),
             ("file", ["inspect"]) => self.names(Kind::Assembly, None),
             (_, ["camera"]) => self.keywords("camera", &["fixed", "auto"]),
+            ("file", ["part", _, "="]) => self.names(Kind::Family, None),
             (_, ["let", _, "=", value @ ..]) => self.dimension(value, Takes::Length, ""),
             (_, ["light", _, "="]) => self.calls(Role::Light),
             (_, ["add" | "cut" | "keep", _, "=", rest @ ..]) => self.feature(rest),
@@ -120,8 +122,48 @@ impl Proposals<'_> {
                 let takes = owner.argument(key).map_or(Takes::Length, |a| a.takes);
                 self.value_of(takes, value, op);
             }
+            (None, words) if here.statement.first() == Some(&"part") => self.member(here, words),
             // Coordinates, or arithmetic.
             _ => self.dimension(words, Takes::Length, ""),
+        }
+    }
+
+    /// `part pin = iso2338(d = 6, …`: the parameters of the family, and the sizes of their tables.
+    fn member(&mut self, here: &Context, words: &[&str]) {
+        let Some(call) = &here.call else { return };
+        let family = self.index.find(Kind::Family, None, call.word).map(|id| self.index.symbols[id].span);
+        let trees = self.project.survey.trees.iter().flat_map(|tree| &tree.lines);
+        let drawn = trees.filter_map(|line| match &line.stmt {
+            Stmt::Family { name, params, body } if Some(name.span) == family => Some((params, body)),
+            _ => None,
+        });
+        let Some((params, body)) = drawn.last() else { return };
+        match words {
+            [] => {
+                let open =
+                    params.iter().map(|p| p.text.as_str()).chain(["material"]).filter(|p| !call.keys.contains(p));
+                let found = open.map(|name| Proposal {
+                    label: name.to_string(),
+                    kind: CompletionItemKind::FIELD,
+                    detail: format!("of the family {}", call.word),
+                    snippet: format!("{name} = $0"),
+                });
+                self.found.extend(found);
+            }
+            ["material", "="] => self.names(Kind::Material, None),
+            [param, "="] => {
+                let tables = body.lines.iter().filter_map(|line| match &line.stmt {
+                    Stmt::Table { name, body, .. } if name.text == *param => Some(body),
+                    _ => None,
+                });
+                let rows = tables.flat_map(|table| &table.lines);
+                for line in rows {
+                    if let Stmt::Row { key, .. } = &line.stmt {
+                        self.word(&key.text, self.project.slice(line.span).trim());
+                    }
+                }
+            }
+            _ => {}
         }
     }
 

@@ -17,6 +17,7 @@ pub enum Kind {
     Dimension,
     Material,
     Part,
+    Family,
     Outline,
     Side,
     Feature,
@@ -33,6 +34,7 @@ impl Kind {
             Kind::Dimension => "dimension",
             Kind::Material => "material",
             Kind::Part => "part",
+            Kind::Family => "family",
             Kind::Outline => "outline",
             Kind::Side => "side",
             Kind::Feature => "feature",
@@ -56,7 +58,7 @@ pub struct Symbol {
     pub whole: Span,
     /// The part of a dimension, an outline or a feature; the group of a feature in it; the outline of a side.
     pub owner: Option<SymbolId>,
-    /// The part of a component.
+    /// The part of a component; the family of a part that is a member of one.
     pub part: Option<SymbolId>,
 }
 
@@ -84,8 +86,8 @@ pub struct Index {
     pub mentions: Vec<Mention>,
     /// First of equal names, by kind and owner.
     names: BTreeMap<(Kind, Option<SymbolId>, String), SymbolId>,
-    /// The names of the parts of components, until all parts are known.
-    parts: Vec<(SymbolId, String)>,
+    /// The names of the parts of components and of the families of parts, until all are known.
+    parts: Vec<(SymbolId, Kind, String)>,
     /// The name of the outline that a feature is made from.
     outlines: BTreeMap<SymbolId, String>,
 }
@@ -96,8 +98,8 @@ impl Index {
         for file in files {
             file.lines.iter().for_each(|line| index.define(line, None));
         }
-        for (component, part) in std::mem::take(&mut index.parts) {
-            index.symbols[component].part = index.find(Kind::Part, None, &part);
+        for (symbol, kind, name) in std::mem::take(&mut index.parts) {
+            index.symbols[symbol].part = index.find(kind, None, &name);
         }
         for file in files {
             file.lines.iter().for_each(|line| index.uses(line, "file", None));
@@ -126,10 +128,10 @@ impl Index {
         near.into_iter().rev()
     }
 
-    /// The part in whose braces a place lies.
+    /// The part or family in whose braces a place lies.
     pub fn part_at(&self, file: u32, offset: usize) -> Option<SymbolId> {
         let within = |s: Span| s.file == file && (s.start as usize..=s.end as usize).contains(&offset);
-        self.symbols.iter().position(|s| s.kind == Kind::Part && within(s.whole))
+        self.symbols.iter().position(|s| [Kind::Part, Kind::Family].contains(&s.kind) && within(s.whole))
     }
 
     pub fn mentions_of(&self, symbol: SymbolId) -> impl Iterator<Item = &Mention> {
@@ -145,6 +147,15 @@ impl Index {
                 self.add(Kind::Material, name, line, None);
             }
             Stmt::Part { name, body } => self.block(Kind::Part, name, body, line, None),
+            Stmt::Family { name, params, body } => self.family(name, params, body, line),
+            Stmt::Member { name, call } => {
+                let id = self.add(Kind::Part, name, line, None);
+                self.parts.push((id, Kind::Family, call.name.text.clone()));
+            }
+            // The columns of a table are dimensions of its family.
+            Stmt::Table { columns, .. } => columns.iter().for_each(|name| {
+                self.add(Kind::Dimension, name, line, owner);
+            }),
             Stmt::Outline { name, body } => self.block(Kind::Outline, name, body, line, owner),
             Stmt::Side(side) => {
                 if let Some(name) = &side.name {
@@ -181,9 +192,17 @@ impl Index {
         body.lines.iter().for_each(|inner| self.define(inner, Some(id)));
     }
 
+    fn family(&mut self, name: &Name, params: &[Name], body: &Body, line: &Line) {
+        let id = self.add(Kind::Family, name, line, None);
+        for param in params {
+            self.add(Kind::Dimension, param, line, Some(id));
+        }
+        body.lines.iter().for_each(|inner| self.define(inner, Some(id)));
+    }
+
     fn component(&mut self, name: &Name, part: Option<&Name>, line: &Line) {
         let id = self.add(Kind::Component, name, line, None);
-        self.parts.push((id, part.unwrap_or(name).text.clone()));
+        self.parts.push((id, Kind::Part, part.unwrap_or(name).text.clone()));
     }
 
     fn add(&mut self, kind: Kind, name: &Name, line: &Line, owner: Option<SymbolId>) -> SymbolId {
@@ -204,6 +223,16 @@ impl Index {
             }
             Stmt::Measure(measure) => [&measure.from, &measure.to].into_iter().for_each(|face| self.face(face)),
             Stmt::Watch { path, .. } | Stmt::Ignore(path) => self.path(path),
+            Stmt::Table { name, .. } => {
+                self.mention(Kind::Dimension, part, name);
+            }
+            Stmt::Member { call, .. } => {
+                if let Some(family) = self.mention(Kind::Family, None, &call.name) {
+                    call.args.list.iter().for_each(|arg| {
+                        self.mention(Kind::Dimension, Some(family), &arg.key);
+                    });
+                }
+            }
             Stmt::Inspect { name: Some(name), .. } => {
                 self.mention(Kind::Assembly, None, name);
             }
@@ -215,6 +244,7 @@ impl Index {
         let Some((inner, body)) = body_of(&line.stmt) else { return };
         let part = match &line.stmt {
             Stmt::Part { name, .. } => self.find(Kind::Part, None, &name.text),
+            Stmt::Family { name, .. } => self.find(Kind::Family, None, &name.text),
             _ => part,
         };
         body.lines.iter().for_each(|line| self.uses(line, inner, part));
@@ -289,9 +319,10 @@ impl Index {
         }
     }
 
-    /// The part of a component.
+    /// What draws a component: its part, or the family that its part is a member of.
     pub fn part_of(&self, component: SymbolId) -> Option<SymbolId> {
-        self.symbols.get(component)?.part
+        let part = self.symbols.get(component)?.part?;
+        self.symbols[part].part.or(Some(part))
     }
 
     /// `mount[2].rail.base`: a component, features of its part, and at last perhaps the side of an outline.

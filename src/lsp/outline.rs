@@ -65,7 +65,7 @@ pub fn kind(kind: Kind) -> SymbolKind {
     match kind {
         Kind::Dimension => SymbolKind::CONSTANT,
         Kind::Material => SymbolKind::STRUCT,
-        Kind::Part => SymbolKind::CLASS,
+        Kind::Part | Kind::Family => SymbolKind::CLASS,
         Kind::Outline => SymbolKind::INTERFACE,
         Kind::Side | Kind::Measure => SymbolKind::FIELD,
         Kind::Feature => SymbolKind::PROPERTY,
@@ -103,7 +103,7 @@ fn colour(kind: Kind) -> u32 {
     match kind {
         Kind::Dimension => 0,
         Kind::Material | Kind::Outline => 1,
-        Kind::Part => 2,
+        Kind::Part | Kind::Family => 2,
         Kind::Feature | Kind::Side | Kind::Measure => 3,
         Kind::Assembly | Kind::Station => 4,
         Kind::Component | Kind::Light => 5,

@@ -6,6 +6,7 @@
 
 use super::index::{Index, Kind, Mention, Mentioned, Symbol, SymbolId};
 use super::project::Project;
+use super::uri::library_address;
 use crate::design::Read;
 use crate::diag::Span;
 use lsp_types::{Location, TextEdit};
@@ -36,10 +37,15 @@ impl Target {
     }
 }
 
-/// Where what is named at a place is defined.
-pub fn definition(project: &Project, file: u32, offset: usize) -> Option<Location> {
+/// Where what is named at a place is defined; in the parts library only for a client that can open it.
+pub fn definition(project: &Project, file: u32, offset: usize, library: bool) -> Option<Location> {
     let mention = project.named_at(file, offset).into_iter().next()?;
-    project.location(project.index().symbols[mention.symbol].span)
+    let span = project.index().symbols[mention.symbol].span;
+    let read_only = || {
+        let uri = library_address(project.name(span.file)).filter(|_| library)?;
+        Some(Location::new(uri, project.text(span.file)?.range_of(span)))
+    };
+    project.location(span).or_else(read_only)
 }
 
 /// Where a target is named in a project; its definition only if asked for.
@@ -134,7 +140,11 @@ fn spelled(kind: Kind, new: &str) -> Result<(), String> {
 fn untaken(project: &Project, symbol: SymbolId, new: &str) -> Result<(), String> {
     let index = project.index();
     let Symbol { kind, owner, .. } = &index.symbols[symbol];
-    let Some(taken) = index.find(*kind, *owner, new).filter(|taken| *taken != symbol) else { return Ok(()) };
+    // A part and a family of parts have one kind of name.
+    let other = if *kind == Kind::Family { Kind::Part } else { Kind::Family };
+    let others = [Kind::Part, Kind::Family].contains(kind).then(|| index.find(other, None, new)).flatten();
+    let taken = index.find(*kind, *owner, new).or(others);
+    let Some(taken) = taken.filter(|taken| *taken != symbol) else { return Ok(()) };
     let span = index.symbols[taken].span;
     let line = project.text(span.file).map_or(0, |text| text.position(span.start as usize).line + 1);
     Err(format!("there is a {} `{new}` already: {}, line {line}", kind.word(), project.name(span.file)))

@@ -3,6 +3,7 @@
 use super::desk::Desk;
 use super::server::{Fault, INVALID_PARAMS, METHOD_NOT_FOUND, REQUEST_FAILED, Server, params};
 use super::{complete, fixes, hints, hover, layout, outline, rename, uri};
+use crate::design::{library, path_beside};
 use lsp_types::{
     CodeActionParams, CompletionParams, DocumentFormattingParams, DocumentHighlight, DocumentSymbolParams,
     DocumentSymbolResponse, ExecuteCommandParams, GotoDefinitionParams, HoverParams, InlayHintParams, Location, Range,
@@ -13,7 +14,7 @@ use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// The command that returns the page of a diagnostic: `["E0305"]`.
+/// The command that returns the page of a diagnostic, `["E0305"]`, or a file of the parts library, `["std/iso2338"]`.
 pub const EXPLAIN: &str = "gonogo.explain";
 
 /// More names than this answer no search.
@@ -81,7 +82,8 @@ fn usable(desk: &Desk, name: &str) -> Vec<String> {
             up += "../";
         }
     };
-    desk.known().filter(|other| *other != name).filter_map(beside).collect()
+    let own = desk.known().filter(|other| *other != name).filter_map(beside);
+    own.chain(library::files().map(|(name, _)| name.to_string())).collect()
 }
 
 fn signature(server: &mut Server, params: lsp_types::SignatureHelpParams) -> Option<lsp_types::SignatureHelp> {
@@ -92,11 +94,12 @@ fn signature(server: &mut Server, params: lsp_types::SignatureHelpParams) -> Opt
 fn definition(server: &mut Server, params: GotoDefinitionParams) -> Option<Location> {
     let (name, offset) = place(&server.desk, &params.text_document_position_params)?;
     let (project, file) = server.desk.project_of(&name)?;
-    used_file(&project, file, offset).or_else(|| rename::definition(&project, file, offset))
+    let library = server.frame().explains;
+    used_file(&project, file, offset, library).or_else(|| rename::definition(&project, file, offset, library))
 }
 
 /// The file that a `use` at a place names.
-fn used_file(project: &super::project::Project, file: u32, offset: usize) -> Option<Location> {
+fn used_file(project: &super::project::Project, file: u32, offset: usize, library: bool) -> Option<Location> {
     let tree = project.survey.trees.get(file as usize)?;
     let name = tree.lines.iter().find_map(|line| match &line.stmt {
         crate::syntax::ast::Stmt::Use(name)
@@ -106,7 +109,10 @@ fn used_file(project: &super::project::Project, file: u32, offset: usize) -> Opt
         }
         _ => None,
     })?;
-    let used = crate::design::path_beside(project.name(file), &name.text);
+    if library::is_meant(&name.text) {
+        return Some(Location::new(uri::library_address(&name.text).filter(|_| library)?, Range::default()));
+    }
+    let used = path_beside(project.name(file), &name.text);
     project.file(&used)?;
     Some(Location::new(uri::address(&used)?, Range::default()))
 }
@@ -227,6 +233,7 @@ fn explain(params: &ExecuteCommandParams) -> Result<Value, Fault> {
     let code = params.arguments.first().and_then(Value::as_str);
     match (params.command.as_str(), code) {
         (EXPLAIN, Some(code)) => hover::page(code)
+            .or_else(|| library::text(code))
             .map(Value::from)
             .ok_or_else(|| Fault::new(INVALID_PARAMS, format!("there is no diagnostic `{code}`"))),
         (EXPLAIN, None) => Err(Fault::new(INVALID_PARAMS, "the command takes the code of a diagnostic")),

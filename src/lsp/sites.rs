@@ -13,7 +13,8 @@ pub struct Dims<'a> {
 pub fn body_of(stmt: &Stmt) -> Option<(&'static str, &Body)> {
     Some(match stmt {
         Stmt::Material { body, .. } => ("material", body),
-        Stmt::Part { body, .. } => ("part", body),
+        Stmt::Part { body, .. } | Stmt::Family { body, .. } => ("part", body),
+        Stmt::Table { body, .. } => ("table", body),
         Stmt::Outline { body, .. } => ("outline", body),
         Stmt::Assembly { body, .. } => ("assembly", body),
         Stmt::Station { body, .. } => ("station", body),
@@ -63,6 +64,11 @@ pub fn dims_of<'a>(stmt: &'a Stmt, block: &str, out: &mut Vec<Dims<'a>>) {
             out.extend(side.corner.iter().map(|c| any(&c.size)));
         }
         Stmt::Measure(measure) => out.extend(measure.within.iter().map(any)),
+        Stmt::Row { cells, .. } => out.extend(cells.iter().map(any)),
+        Stmt::Member { call, .. } => call.args.list.iter().for_each(|arg| {
+            let material = (arg.key.text == "material").then_some(Takes::Material);
+            value(&arg.value, material, out);
+        }),
         Stmt::Light { call, .. } => arguments(&call.name, &call.args, Role::Light, out),
         Stmt::Watch { args: Some(args), .. } => {
             args.list.iter().for_each(|arg| value(&arg.value, Some(Takes::Whole), out));

@@ -7,10 +7,15 @@ use lsp_types::Uri;
 use std::str::FromStr;
 
 const FILE: &str = "file://";
+/// Where clients that know how to ask for them keep the files of the parts library: `gonogo:/std/iso2338.gng`.
+const LIBRARY: &str = "gonogo:/std/";
 
 /// The name of the file at an address.
 pub fn name(uri: &Uri) -> String {
     let text = uri.as_str();
+    if let Some(name) = text.strip_prefix(LIBRARY) {
+        return format!("std/{}", name.strip_suffix(".gng").unwrap_or(name));
+    }
     let Some(rest) = text.strip_prefix(FILE) else { return text.to_string() };
     // Behind the host, which is empty but for network shares.
     let path = rest.find('/').map_or(rest, |at| if at == 0 { rest } else { &text[FILE.len() - 2..] });
@@ -33,6 +38,11 @@ pub fn address(name: &str) -> Option<Uri> {
         _ => return None,
     };
     Uri::from_str(&text).ok()
+}
+
+/// The address of a file of the parts library, which only some clients can open.
+pub fn library_address(name: &str) -> Option<Uri> {
+    Uri::from_str(&format!("{LIBRARY}{}.gng", name.strip_prefix("std/")?)).ok()
 }
 
 fn decoded(text: &str) -> String {
@@ -70,5 +80,6 @@ mod tests {
         }
         assert_eq!(decoded("a%2Gb%4%41%"), "a%2Gb%4A%");
         assert_eq!(address("std/iso2338"), None);
+        assert_eq!(name(&library_address("std/iso2338").unwrap()), "std/iso2338");
     }
 }
