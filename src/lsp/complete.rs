@@ -133,11 +133,11 @@ impl Proposals<'_> {
         let Some(call) = &here.call else { return };
         let family = self.index.find(Kind::Family, None, call.word).map(|id| self.index.symbols[id].span);
         let trees = self.project.survey.trees.iter().flat_map(|tree| &tree.lines);
-        let drawn = trees.filter_map(|line| match &line.stmt {
+        let mut drawn = trees.filter_map(|line| match &line.stmt {
             Stmt::Family { name, params, body } if Some(name.span) == family => Some((params, body)),
             _ => None,
         });
-        let Some((params, body)) = drawn.last() else { return };
+        let Some((params, body)) = drawn.next_back() else { return };
         match words {
             [] => {
                 let open =
