@@ -64,7 +64,6 @@ struct NodeSummary<'a> {
     mask_pixels: u32,
     /// Coefficients of each resolution: together the dimensions of the density.
     coefficients: Vec<usize>,
-    threshold: f64,
     /// Number of held-out renders, good and faulty, and the scores that come nearest to the other side.
     held_out: (usize, usize),
     lowest_good: Option<f64>,
@@ -77,6 +76,7 @@ struct HypothesisSummary<'a> {
     fault: &'a str,
     #[serde(skip_serializing_if = "str::is_empty")]
     sweep: &'a str,
+    threshold: f64,
     images: usize,
     /// Of the integers.
     mean: f64,
@@ -144,7 +144,6 @@ fn node(node: &Node) -> NodeSummary<'_> {
         window: node.size,
         mask_pixels: node.mask.iter().flat_map(|row| row.chunks(2)).map(|run| run[1]).sum(),
         coefficients: stencil.levels.iter().map(|l| l.len()).collect(),
-        threshold: rounded(node.threshold, 4),
         held_out: (node.good_scores.len(), node.fault_scores.len()),
         lowest_good: node.good_scores.first().map(|&s| rounded(s, 3)),
         highest_fault: node.fault_scores.last().map(|&s| rounded(s, 3)),
@@ -160,6 +159,7 @@ fn hypothesis(hypothesis: &Hypothesis) -> HypothesisSummary<'_> {
     HypothesisSummary {
         fault: &hypothesis.fault,
         sweep: &hypothesis.sweep,
+        threshold: rounded(hypothesis.threshold, 4),
         images: hypothesis.images.len(),
         mean: rounded(mean, 2),
         spread: rounded(spread, 2),

@@ -154,7 +154,6 @@ mod tests {
             parent: None,
             outline: [[10.0, 10.0], [50.0, 10.0], [50.0, 40.0], [10.0, 40.0]],
             score: 0.0,
-            threshold: 0.0,
             against: Vec::new(),
             best_fault: "missing".into(),
             inside: 1.0,

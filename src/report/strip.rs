@@ -32,16 +32,15 @@ pub fn strip(node: &Node, marks: &[Mark]) -> String {
     };
     let good = ticks(&node.good_scores, MIDDLE - 1.0, MIDDLE - 1.0 - TICK);
     let fault = ticks(&node.fault_scores, MIDDLE + 1.0, MIDDLE + 1.0 + TICK);
-    let threshold = at(scale.x(node.threshold));
+    let threshold = at(scale.x(0.0));
     let marks: String = marks.iter().map(|m| mark(m, &scale)).collect();
     let label = format!(
-        "{}: held-out good renders {} to {}, faulty {} to {}, threshold {}",
+        "{}: held-out good renders {} to {}, faulty {} to {}, threshold 0",
         node.name,
         ends(&node.good_scores)[0],
         ends(&node.good_scores)[1],
         ends(&node.fault_scores)[0],
-        ends(&node.fault_scores)[1],
-        number(node.threshold, 3)
+        ends(&node.fault_scores)[1]
     );
     format!(
         "<svg class=\"strip\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\"><path class=\"axis\" \
@@ -76,7 +75,7 @@ struct Scale {
 impl Scale {
     /// Of all held-out scores and the threshold; `None` without any.
     fn of(node: &Node) -> Option<Scale> {
-        let all = node.good_scores.iter().chain(&node.fault_scores).chain([&node.threshold]);
+        let all = node.good_scores.iter().chain(&node.fault_scores).chain([&0.0]);
         let all: Vec<f64> = all.copied().filter(|v| v.is_finite()).collect();
         if node.good_scores.is_empty() && node.fault_scores.is_empty() {
             return None;

@@ -57,7 +57,6 @@ fn verdict() -> Verdict {
         parent: None,
         outline,
         score: -1.0,
-        threshold: 0.0,
         against: vec![0.0, -1.0],
         best_fault: SPITE.into(),
         inside: 1.0,

@@ -24,7 +24,7 @@ const ROUNDING: f64 = 1.0 / (255.0 * 3.464);
 /// The fault that comes in any size.
 const SLIGHT: &str = "not seated";
 /// Format of the calibration file.
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
 
 /// What one photo tells about a station.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -53,16 +53,21 @@ pub struct Calibration {
 pub struct Reference {
     /// Per node of the model its window, row by row, in steps of 1/4000 of full scale.
     pub windows: Vec<Vec<Row>>,
+    /// Per node of the model how far it was from where pose and camera have it (px).
+    pub shifts: Vec<[f64; 2]>,
 }
 
 /// Steps of a reference's grey values.
 const GREY_STEPS: f32 = 4000.0;
 
 impl Reference {
-    fn of(windows: &[Grid]) -> Reference {
+    fn of(seen: &[(Grid, [f64; 2])]) -> Reference {
         let value = |v: &f32| (v * GREY_STEPS).round().clamp(0.0, f32::from(u16::MAX)) as u16;
         let rows = |g: &Grid| g.values.chunks(g.width).map(|row| Row(row.iter().map(value).collect())).collect();
-        Reference { windows: windows.iter().map(rows).collect() }
+        Reference {
+            windows: seen.iter().map(|(w, _)| rows(w)).collect(),
+            shifts: seen.iter().map(|(_, s)| *s).collect(),
+        }
     }
 
     /// The window of a node.
@@ -77,7 +82,8 @@ impl Reference {
         let fits = |(rows, node): (&Vec<Row>, &Node)| {
             rows.len() == node.size[1] as usize && rows.iter().all(|row| row.0.len() == node.size[0] as usize)
         };
-        self.windows.len() == model.nodes.len() && self.windows.iter().zip(&model.nodes).all(fits)
+        let places = self.shifts.len() == model.nodes.len() && self.shifts.iter().flatten().all(|s| s.is_finite());
+        places && self.windows.len() == model.nodes.len() && self.windows.iter().zip(&model.nodes).all(fits)
     }
 }
 

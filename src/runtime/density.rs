@@ -10,7 +10,7 @@ use super::linear;
 use std::ops::Range;
 
 /// Learned directions per hypothesis.
-const DIRECTIONS: usize = 2;
+const DIRECTIONS: usize = 3;
 /// Weight of the level's median variance, in draws.
 const SHRINK_DRAWS: f64 = 6.0;
 /// Variance floor: share of the template's root mean square at the level, for what no renderer knows.

@@ -73,6 +73,26 @@ impl Field {
         inside.then(|| self.gradient[y as usize * self.width + x as usize])
     }
 
+    /// Distance along the normal to the steepest edge of the right polarity within reach, sub-pixel, and its agreement.
+    pub fn nearest_edge(&self, at: [f64; 2], direction: [f32; 2], reach: f64) -> Option<(f64, f32)> {
+        const STEP: f64 = 0.5;
+        let steps = (reach / STEP).round() as i32;
+        let point = |t: f64| [at[0] + t * f64::from(direction[0]), at[1] + t * f64::from(direction[1])];
+        let slopes: Option<Vec<f32>> =
+            (-steps..=steps).map(|i| self.slope(point(f64::from(i) * STEP), direction)).collect();
+        let slopes = slopes?;
+        let best = (0..slopes.len()).max_by(|&a, &b| slopes[a].total_cmp(&slopes[b]))?;
+        if best == 0 || best + 1 == slopes.len() {
+            return None;
+        }
+        let [a, b, c] = [slopes[best - 1], slopes[best], slopes[best + 1]].map(f64::from);
+        let bend = a - 2.0 * b + c;
+        let shift = if bend < 0.0 { 0.5 * (a - c) / bend } else { 0.0 };
+        let distance = (best as f64 - f64::from(steps) + shift) * STEP;
+        let agreement = self.agreement(point(distance), direction);
+        Some((distance, agreement))
+    }
+
     /// Gradient across an edge, bilinear, without its sign where edges have none; `None` outside.
     pub(super) fn slope(&self, at: [f64; 2], direction: [f32; 2]) -> Option<f32> {
         let (x, y) = (at[0], at[1]);

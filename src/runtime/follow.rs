@@ -48,7 +48,10 @@ impl View<'_> {
             .iter()
             .filter_map(|point| {
                 let (at, direction) = point.seen(self.camera, pose)?;
-                let (distance, agreement) = self.nearest_edge(at, direction, reach)?;
+                let (distance, agreement) = self.field.nearest_edge(at, direction, reach)?;
+                if agreement <= LEAST_AGREEMENT {
+                    return None;
+                }
                 let along = |p: [f64; 2]| p[0] * f64::from(direction[0]) + p[1] * f64::from(direction[1]);
                 let here = along(project(parameters, point)?);
                 let mut gradient = Vec::with_capacity(parameters.len());
@@ -65,32 +68,12 @@ impl View<'_> {
             })
             .collect()
     }
-
-    /// Distance along the normal to the steepest edge of the right polarity within reach, sub-pixel, and its agreement.
-    fn nearest_edge(&self, at: [f64; 2], direction: [f32; 2], reach: f64) -> Option<(f64, f32)> {
-        const STEP: f64 = 0.5;
-        let steps = (reach / STEP).round() as i32;
-        let point = |t: f64| [at[0] + t * f64::from(direction[0]), at[1] + t * f64::from(direction[1])];
-        let slopes: Option<Vec<f32>> =
-            (-steps..=steps).map(|i| self.field.slope(point(f64::from(i) * STEP), direction)).collect();
-        let slopes = slopes?;
-        let best = (0..slopes.len()).max_by(|&a, &b| slopes[a].total_cmp(&slopes[b]))?;
-        if best == 0 || best + 1 == slopes.len() {
-            return None;
-        }
-        let [a, b, c] = [slopes[best - 1], slopes[best], slopes[best + 1]].map(f64::from);
-        let bend = a - 2.0 * b + c;
-        let shift = if bend < 0.0 { 0.5 * (a - c) / bend } else { 0.0 };
-        let distance = (best as f64 - f64::from(steps) + shift) * STEP;
-        let agreement = self.field.agreement(point(distance), direction);
-        (agreement > LEAST_AGREEMENT).then_some((distance, agreement))
-    }
 }
 
-/// Gauss and Newton with priors: parameters start at 0 and are pulled back with their `spread`.
-pub(super) fn follow(spread: &[f64], pulls: impl Fn(&[f64], f64) -> Vec<Pull>) -> Vec<f64> {
+/// Gauss and Newton with priors: parameters begin at `start` and are pulled back to 0 with their `spread`.
+pub(super) fn follow(start: Vec<f64>, spread: &[f64], pulls: impl Fn(&[f64], f64) -> Vec<Pull>) -> Vec<f64> {
     let n = spread.len();
-    let mut parameters = vec![0.0; n];
+    let mut parameters = start;
     for round in 0..ROUNDS {
         let t = round as f64 / (ROUNDS - 1) as f64;
         let pulls = pulls(&parameters, FIRST_REACH + (LAST_REACH - FIRST_REACH) * t);

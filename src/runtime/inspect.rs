@@ -7,12 +7,13 @@
 use super::calibrate::{Calibration, widened};
 use super::camera::Camera;
 use super::density::Density;
-use super::judge::{Evidence, NodeImages, Prepared, Pyramid};
+use super::judge::{Evidence, Look, NodeImages, Prepared};
 use super::light::Light;
 use super::locate::{Located, Search};
 use super::model::{Model, Node};
 use super::photo::Photo;
 use super::pose::Pose;
+use super::settle::{self, Expected};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
@@ -60,9 +61,9 @@ pub struct NodeReport {
     pub parent: Option<usize>,
     /// Corners of the visible component's box as carried to the photo (px).
     pub outline: [[f64; 2]; 4],
-    /// Log-likelihood ratio of the good state against the best error mode, per coefficient.
+    /// Log-likelihood ratio per coefficient of the good state against the error mode that comes closest, less that mode's
+    /// threshold: faulty below zero.
     pub score: f64,
-    pub threshold: f64,
     /// Per hypothesis, log-likelihood ratio of the good state against it, per coefficient.
     pub against: Vec<f64>,
     /// The error mode that fits best.
@@ -99,6 +100,8 @@ pub struct Inspector<'a> {
     prepared: Prepared,
     light: Light,
     densities: Vec<Vec<Density>>,
+    /// Where calibration expects the nodes; `None` before there is any.
+    expected: Option<Vec<Expected>>,
 }
 
 impl<'a> Inspector<'a> {
@@ -120,7 +123,8 @@ impl<'a> Inspector<'a> {
         let densities = prepared.nodes.iter().enumerate().map(densities).collect();
         let camera = calibration.installation.apply(&model.station.camera);
         let search = Search::new(&model.locator);
-        Some(Inspector { model, calibration, camera, search, prepared, light, densities })
+        let expected = expected(&model, &calibration);
+        Some(Inspector { model, calibration, camera, search, prepared, light, densities, expected })
     }
 
     pub fn model(&self) -> &Model {
@@ -200,9 +204,20 @@ impl<'a> Inspector<'a> {
 
     /// Log-likelihoods of all nodes.
     pub fn evidence(&self, photo: &Photo, pose: &Pose) -> Vec<Evidence> {
+        let looks = self.looks(photo, pose);
+        let nodes = || self.prepared.nodes.iter().zip(&looks).zip(&self.densities);
+        let shifts: Vec<[f64; 2]> = nodes().map(|((node, look), d)| node.shift(&d[0], look)).collect();
+        let own = |(i, ((node, look), densities)): (usize, ((&NodeImages, &Look), &Vec<Density>))| {
+            let expected = self.expected.as_ref().map(|all| settle::in_photo(all, &shifts, i));
+            node.evidence(&densities[..node.own], look, expected.as_ref())
+        };
+        nodes().enumerate().map(own).collect()
+    }
+
+    fn looks(&self, photo: &Photo, pose: &Pose) -> Vec<Look> {
         let pyramid = self.prepared.pyramid(&photo.light);
-        let own = |i: usize| self.weigh(i, &self.densities[i][..self.prepared.nodes[i].own], &pyramid, pose);
-        (0..self.prepared.nodes.len()).map(own).collect()
+        let look = |node: &NodeImages| node.look(&self.light, pyramid.at(node.window.frame.factor), &self.camera, pose);
+        self.prepared.nodes.iter().map(look).collect()
     }
 
     /// Log-likelihoods of the disturbed states of the nodes that need an explanation; empty for the others.
@@ -211,32 +226,30 @@ impl<'a> Inspector<'a> {
         if nodes.iter().filter(|n| n.faulty).count() < 2 {
             return vec![Vec::new(); nodes.len()];
         }
-        let pyramid = self.prepared.pyramid(&photo.light);
-        let states = |i: usize| self.weigh(i, &self.densities[i][self.prepared.nodes[i].own..], &pyramid, pose);
+        let looks = self.looks(photo, pose);
+        let states = |i: usize| {
+            let node = &self.prepared.nodes[i];
+            node.evidence(&self.densities[i][node.own..], &looks[i], None)
+        };
         (0..nodes.len()).map(|i| if needed(i) { states(i).log_likelihoods } else { Vec::new() }).collect()
-    }
-
-    fn weigh(&self, node: usize, densities: &[Density], pyramid: &Pyramid, pose: &Pose) -> Evidence {
-        let node = &self.prepared.nodes[node];
-        node.evidence(densities, &self.light, pyramid.at(node.window.frame.factor), &self.camera, pose)
     }
 
     fn report(&self, index: usize, evidence: &Evidence, pose: &Pose) -> NodeReport {
         let node = &self.model.nodes[index];
-        let (fault, score) = score(evidence, self.coefficients(index));
+        let against = against(evidence, self.coefficients(index));
+        let (fault, score) = score(node, &against);
         NodeReport {
             name: node.name.clone(),
             level: node.level,
             parent: node.parent.map(|p| p as usize),
             outline: self.carried(node.visible, node.plane, pose),
             score,
-            threshold: node.threshold,
-            against: against(evidence, self.coefficients(index)),
+            against,
             best_fault: fault.map_or_else(String::new, |h| node.hypotheses[h].fault.clone()),
             inside: evidence.inside,
             strangeness: evidence.strangeness,
             // What is no number is no proof of anything.
-            faulty: score.is_nan() || score < node.threshold,
+            faulty: score.is_nan() || score < 0.0,
             explained: false,
         }
     }
@@ -335,16 +348,28 @@ fn strange(nodes: &[NodeReport]) -> Option<&NodeReport> {
     (worst.strangeness > STRANGE + COMMON * common).then_some(worst)
 }
 
+fn expected(model: &Model, calibration: &Calibration) -> Option<Vec<Expected>> {
+    let seen = |i: usize| calibration.references.iter().map(|r| r.shifts[i]).collect::<Vec<_>>();
+    let after = |(i, node): (usize, &Node)| settle::after(node, &seen(i));
+    (!calibration.references.is_empty()).then(|| model.nodes.iter().enumerate().map(after).collect())
+}
+
 /// The light of a station whose lamps were calibrated to these weights.
 pub fn light(model: &Model, weights: &[f64]) -> Light {
     Light::new(weights, &model.station.lamps)
 }
 
-/// The error mode that fits best and the log-likelihood ratio per coefficient of the good state against it.
-pub fn score(evidence: &Evidence, coefficients: usize) -> (Option<usize>, f64) {
-    let l = &evidence.log_likelihoods;
-    let fault = (1..l.len()).max_by(|&a, &b| l[a].total_cmp(&l[b]));
-    (fault, fault.map_or(f64::INFINITY, |h| (l[0] - l[h]) / coefficients.max(1) as f64))
+/// The likeliest error mode beyond its threshold, else the one that comes closest to it, and the least that any mode leaves to
+/// its threshold.
+pub fn score(node: &Node, against: &[f64]) -> (Option<usize>, f64) {
+    let left = |h: usize| against[h] - node.hypotheses[h].threshold;
+    let modes = || 1..node.hypotheses.len();
+    if let Some(unknown) = modes().find(|&h| left(h).is_nan()) {
+        return (Some(unknown), f64::NAN);
+    }
+    let likeliest = modes().filter(|&h| left(h) < 0.0).min_by(|&a, &b| against[a].total_cmp(&against[b]));
+    let closest = modes().min_by(|&a, &b| left(a).total_cmp(&left(b)));
+    (likeliest.or(closest), closest.map_or(f64::INFINITY, left))
 }
 
 fn against(evidence: &Evidence, coefficients: usize) -> Vec<f64> {

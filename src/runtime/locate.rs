@@ -17,6 +17,8 @@ const BEAM: usize = 12;
 /// A coarse step moves edge points by at most this many coarse px.
 const COARSE_STEP_PX: f64 = 1.0;
 
+/// Edges are followed at resolutions of up to so many px; beyond, a px is a small part of anything.
+const MOST_PIXELS: usize = 1_000_000;
 /// Poses of the coarse grid at most, far above any real station: a model that asks for more gets wider steps.
 const MOST_POSES: f64 = 1e6;
 
@@ -41,7 +43,7 @@ impl EdgePoint {
     }
 
     /// Place in the field's px and the direction in which light grows there.
-    pub(super) fn seen(&self, camera: &Camera, pose: &Pose) -> Option<([f64; 2], [f32; 2])> {
+    pub fn seen(&self, camera: &Camera, pose: &Pose) -> Option<([f64; 2], [f32; 2])> {
         let p = camera.project(pose.apply(self.at))?;
         let q = camera.project(pose.apply(self.along))?;
         let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
@@ -75,6 +77,8 @@ pub struct Located {
 pub struct Fields {
     pub coarse: Field,
     pub fine: Field,
+    /// Finer ones with their factors, for the last word on the pose.
+    finer: Vec<(u32, Field)>,
 }
 
 impl Search {
@@ -107,7 +111,10 @@ impl Search {
         let field = |factor: u32, smooth| {
             Field::new(&photo.reduced(factor as usize), noise / f64::from(factor), smooth, self.unsigned)
         };
-        Fields { coarse: field(self.coarse_factor, true), fine: field(self.fine_factor, false) }
+        let pixels = |factor: u32| (photo.width / factor as usize) * (photo.height / factor as usize);
+        let halves = std::iter::successors(Some(self.fine_factor / 2), |f| Some(f / 2));
+        let finer = halves.take_while(|&f| f > 0 && pixels(f) <= MOST_PIXELS).map(|f| (f, field(f, false))).collect();
+        Fields { coarse: field(self.coarse_factor, true), fine: field(self.fine_factor, false), finer }
     }
 
     /// The best pose within `standing` (ranges of x, y, z, rz), or `None` when there is nothing to go by.
@@ -118,7 +125,9 @@ impl Search {
             let pose = self.refine(&fields.fine, &fine, pose, standing);
             Located { pose, score: self.score(&fields.fine, &fine, &pose) }
         });
-        refined.max_by(|a, b| a.score.total_cmp(&b.score))
+        let found = refined.max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let finer = |pose, (factor, field): &(u32, Field)| self.refine(field, &camera.reduced(*factor), pose, standing);
+        Some(Located { pose: fields.finer.iter().fold(found.pose, finer), ..found })
     }
 
     /// The best poses of the grid, one per neighbourhood, best first.
@@ -239,7 +248,7 @@ impl Search {
             Pose::from_array(array)
         };
         let view = View { field, camera };
-        let parameters = follow(&spread, |parameters, reach| {
+        let parameters = follow(vec![0.0; free.len()], &spread, |parameters, reach| {
             let pose = with(parameters);
             let points = self.chosen(field, camera, &pose);
             view.pulls(&points, reach, parameters, |p, point| camera.project(with(p).apply(point.at)), &pose, camera)
@@ -275,21 +284,27 @@ impl Search {
             free.iter().zip(own).for_each(|(&i, v)| array[i] += v);
             (Installation::from_array(eight), Pose::from_array(array))
         };
-        let parameters = follow(&spreads, |parameters, reach| {
-            let mut all = Vec::new();
-            for (photo, fields) in fields.iter().enumerate() {
-                let (installation, pose) = split(parameters, photo);
-                let camera = installation.apply(nominal).reduced(self.fine_factor);
-                let points = self.chosen(&fields.fine, &camera, &pose);
-                let view = View { field: &fields.fine, camera: &camera };
-                let project = |p: &[f64], point: &EdgePoint| {
-                    let (installation, pose) = split(p, photo);
-                    installation.apply(nominal).reduced(self.fine_factor).project(pose.apply(point.at))
-                };
-                all.extend(view.pulls(&points, reach, parameters, project, &pose, &camera));
-            }
-            all
-        });
+        let at_level = |start: Vec<f64>, factor: u32, field: &dyn Fn(&Fields) -> &Field| {
+            follow(start, &spreads, |parameters, reach| {
+                let mut all = Vec::new();
+                for (photo, fields) in fields.iter().enumerate() {
+                    let (installation, pose) = split(parameters, photo);
+                    let camera = installation.apply(nominal).reduced(factor);
+                    let points = self.chosen(field(fields), &camera, &pose);
+                    let view = View { field: field(fields), camera: &camera };
+                    let project = |p: &[f64], point: &EdgePoint| {
+                        let (installation, pose) = split(p, photo);
+                        installation.apply(nominal).reduced(factor).project(pose.apply(point.at))
+                    };
+                    all.extend(view.pulls(&points, reach, parameters, project, &pose, &camera));
+                }
+                all
+            })
+        };
+        let mut parameters = at_level(vec![0.0; spreads.len()], self.fine_factor, &|f| &f.fine);
+        for level in 0..fields.iter().map(|f| f.finer.len()).min().unwrap_or(0) {
+            parameters = at_level(parameters, fields[0].finer[level].0, &|f| &f.finer[level].1);
+        }
         let installation = split(&parameters, 0).0;
         (installation, (0..starts.len()).map(|photo| split(&parameters, photo).1).collect())
     }

@@ -20,4 +20,5 @@ pub mod photo;
 pub mod pose;
 pub mod report;
 pub mod row;
+pub mod settle;
 pub mod window;

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The format this version writes, and the only one it reads so far.
-pub const FORMAT: u32 = 2;
+pub const FORMAT: u32 = 3;
 /// Larger files are refused before they are parsed (bytes).
 const LARGEST_FILE: usize = 128 << 20;
 /// Caps on counts, far above any real station.
@@ -163,15 +163,13 @@ pub struct Node {
     pub visible: [f64; 4],
     /// Mask: per row, alternately the first column and the number of columns.
     pub mask: Vec<Vec<u32>>,
-    /// Standard deviation of the node's own shift given the pose (px of the photo).
+    /// Standard deviation of the node's own shift given the pose, before calibration (px of the photo).
     pub spread: [f64; 2],
     /// Nodes whose image this component disturbs when it is faulty.
     pub disturbs: Vec<u32>,
     /// Per lamp, the radiance of one step of the integers below.
     pub steps: Vec<f64>,
-    /// The component is faulty when the log-likelihood ratio per coefficient is below this.
-    pub threshold: f64,
-    /// Log-likelihood ratios per coefficient of held-out renders, ascending.
+    /// Scores of held-out renders, ascending: log-likelihood ratios per coefficient, less the error mode's threshold.
     pub good_scores: Vec<f64>,
     pub fault_scores: Vec<f64>,
     /// The first is the good state.
@@ -199,6 +197,8 @@ pub struct Hypothesis {
     pub fault: String,
     /// What the sweep covers, for people: `0.8 .. 4.0 mm`.
     pub sweep: String,
+    /// The component is faulty when the log-likelihood ratio per coefficient of the good state against this is below.
+    pub threshold: f64,
     /// One image per draw and light group.
     pub images: Vec<Image>,
 }
@@ -324,7 +324,7 @@ impl Node {
         let steps = self.steps.len() == lamps && self.steps.iter().all(|s| s.is_finite() && *s > 0.0);
         ensure(self.plane.is_finite() && steps, "node numbers out of range")?;
         ensure(self.spread.iter().all(|s| s.is_finite() && *s > 0.0), "node spread out of range")?;
-        ensure(!self.threshold.is_nan(), "node threshold out of range")?;
+        ensure(self.hypotheses.iter().all(|h| !h.threshold.is_nan()), "threshold out of range")?;
         ensure(self.parent.is_none_or(|p| (p as usize) < nodes), "node parent out of range")?;
         ensure(self.disturbs.iter().all(|&d| (d as usize) < nodes), "disturbed node out of range")?;
         ensure(self.mask.len() == height as usize, "mask rows")?;

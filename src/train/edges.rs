@@ -9,6 +9,7 @@ use crate::rng::Stream;
 use crate::runtime::camera::{Camera, Vec3, normalise, sub};
 use crate::runtime::field::{Field, doubled, halved};
 use crate::runtime::grid::Grid;
+use crate::runtime::linear;
 use crate::runtime::locate::EdgePoint;
 use crate::runtime::pose::Pose;
 
@@ -59,7 +60,8 @@ pub fn find(ground: &Ground, surface: &Surface, count: usize) -> Vec<EdgePoint> 
     let thinned = thin(candidates, count);
     let point = |(x, y): &(usize, usize)| {
         let index = y * (width + 1) + x;
-        edge_point(&camera, &ground.home, points[index]?, [*x as f64, *y as f64], mean[index])
+        let near = edge_point(&camera, &ground.home, points[index]?, [*x as f64, *y as f64], mean[index])?;
+        settled(&camera, &ground.home, &fields, near, points[index]?, mean[index])
     };
     thinned.iter().filter_map(point).collect()
 }
@@ -165,6 +167,31 @@ fn edge_point(camera: &Camera, home: &Pose, point: Vec3, at: [f64; 2], gradient:
     // The point lies on the pixel corner's own ray, not on the surface sample beside it.
     let plane = camera.on_plane(at, home.apply(point)[2]).map(|p| home.invert(p))?;
     Some(EdgePoint { at: plane, along: std::array::from_fn(|i| plane[i] + unit[i]) })
+}
+
+/// The point moved across its edge to where the shots have the edge in the middle: the place to a fraction of a px.
+fn settled(
+    camera: &Camera,
+    home: &Pose,
+    fields: &[(Field, &Pose)],
+    near: EdgePoint,
+    surface: Vec3,
+    gradient: [f32; 2],
+) -> Option<EdgePoint> {
+    /// As far as the nearest pixel corner may be, and a little.
+    const REACH: f64 = 1.5;
+    let distance = |(field, pose): &(Field, &Pose)| {
+        let (at, direction) = near.seen(camera, pose)?;
+        field.nearest_edge(at, direction, REACH).map(|(distance, _)| distance as f32)
+    };
+    let mut distances: Vec<f32> = fields.iter().filter_map(distance).collect();
+    if distances.is_empty() {
+        return Some(near);
+    }
+    let middle = f64::from(linear::median(&mut distances));
+    let (at, direction) = near.seen(camera, home)?;
+    let moved = [0, 1].map(|k| at[k] + middle * f64::from(direction[k]));
+    edge_point(camera, home, surface, moved, gradient)
 }
 
 /// The grey value below which a share of the pixels lies.

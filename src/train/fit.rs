@@ -137,7 +137,7 @@ impl Cutter<'_> {
             let images = quantised(draws, &steps);
             let fault = sample.fault.into();
             match sample.by {
-                None => hypotheses.push(Hypothesis { fault, sweep: sample.sweep.clone(), images }),
+                None => hypotheses.push(Hypothesis { fault, sweep: sample.sweep.clone(), threshold: 0.0, images }),
                 Some(by) => disturbed.push(Disturbed { by, fault, images }),
             }
         }
@@ -155,7 +155,6 @@ impl Cutter<'_> {
             mask: runs_of(&plan.mask),
             spread: plan.spread,
             disturbs: plan.disturbs.clone(),
-            threshold: 0.0,
             good_scores: Vec::new(),
             fault_scores: Vec::new(),
             hypotheses,

@@ -13,6 +13,7 @@ pub mod prove;
 pub mod shots;
 pub mod stats;
 pub mod synthesise;
+mod thresholds;
 pub mod verify;
 
 use crate::assembly::error_tree::ErrorTree;

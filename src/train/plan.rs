@@ -9,6 +9,7 @@ use crate::assembly::fault::{ErrorMode, Motion};
 use crate::assembly::liaison::Liaison;
 use crate::design::model::{Design, Expr};
 use crate::runtime::camera::Camera;
+use crate::runtime::settle::POSE_RESIDUAL;
 use crate::runtime::window::Frame;
 use crate::scene::build::bodies;
 use crate::view::item_buffer::{ItemBuffer, Mask, PixelBox};
@@ -30,8 +31,6 @@ const DISTURBS: f64 = 0.3;
 const TOUCHES: f64 = 0.03;
 /// A misplaced part hides a component of which it changes more than this share.
 const HIDES: f64 = 0.5;
-/// Standard deviation of a node's shift when its placement is exact (px of the photo): what pose and camera leave.
-const POSE_RESIDUAL: f64 = 1.0;
 /// The smallest watched component should have this many px of the shots across.
 const SMALLEST_ACROSS: u32 = 8;
 /// Coarsest resolution of the shots.

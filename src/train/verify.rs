@@ -5,8 +5,9 @@
 
 use super::edges;
 use super::plan::Plan;
-use super::stats::{normal_quantile, rate, rounded};
+use super::stats::{rate, rounded};
 use super::synthesise::{FaultyShot, Shots};
+use super::thresholds;
 use crate::assembly::fault::ErrorMode;
 use crate::design::model::Design;
 use crate::rng::Stream;
@@ -19,6 +20,7 @@ use crate::runtime::photo::Photo;
 use crate::runtime::pose::Installation;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// Lamps of a customer's station give between these shares of the described power.
 const LAMP_POWERS: [f64; 2] = [0.3, 1.7];
@@ -28,10 +30,6 @@ const EXPOSURES: [f64; 2] = [0.35, 0.75];
 const EXPOSED_QUANTILE: f64 = 0.95;
 /// Share of the held-out goods' lowest locator score below which an assembly counts as not found.
 const ACCEPT_SHARE: f64 = 0.5;
-
-/// Share of the lowest goods and the highest faults left out when asking whether they overlap: photos in which the pose
-/// went wrong, which say nothing about the node.
-const TRIM: f64 = 0.1;
 
 /// Share of the held-out calibrations' lowest correlation below which a photo is refused.
 const POOREST_FIT: f64 = 0.4;
@@ -88,17 +86,13 @@ pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, inde
         let gain = stream.between(EXPOSURES[0], EXPOSURES[1]) as f32 / bright;
         light.values.iter_mut().for_each(|v| *v *= gain);
     }
-    let [width, height] = model.station.camera.size.map(|s| s as usize);
-    let mut values = Vec::with_capacity(width * height);
-    for y in 0..height {
-        let row = (y / base as usize).min(light.height - 1) * light.width;
-        for x in 0..width {
-            let v = f64::from(light.values[row + (x / base as usize).min(light.width - 1)]);
-            let noisy = (v + customer.noise * stream.normal()).clamp(0.0, 1.0);
-            values.push(((noisy * 255.0).round() / 255.0) as f32);
-        }
+    let size = model.station.camera.size.map(|s| s as usize);
+    let mut full = light.magnified(base as usize, size);
+    for v in &mut full.values {
+        let noisy = (f64::from(*v) + customer.noise * stream.normal()).clamp(0.0, 1.0);
+        *v = ((noisy * 255.0).round() / 255.0) as f32;
     }
-    Photo::from_light(Grid::new(width, height, values))
+    Photo::from_light(full)
 }
 
 /// One customer's photos, judged.
@@ -140,7 +134,7 @@ pub fn judge_all(
 /// Writes thresholds and promise into the model.
 pub fn settle(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], held_out: &HeldOut) {
     let HeldOut { judged, unfit } = held_out;
-    scores(model, design, scenes, modes, judged);
+    set_thresholds(model, design, scenes, modes, judged);
     model.locator.accept = accept(judged, model.locator.unsigned);
     model.station.least_correlation = least_correlation(judged);
     model.promise = promise(model, design, scenes, modes, judged, *unfit);
@@ -202,24 +196,23 @@ fn order(good: &[f64], fault: &[f64]) -> f64 {
     if pairs > 0.0 { higher / pairs } else { 1.0 }
 }
 
-/// Scores of every node on goods and on its own faults.
-fn scores(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], judged: &[Judged]) {
-    let nodes = model.nodes.len();
+/// Thresholds of every node's error modes, and its scores on goods and on its own faults.
+fn set_thresholds(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], judged: &[Judged]) {
+    let nodes = model.nodes.len() as f64;
     for (index, node) in model.nodes.iter_mut().enumerate() {
-        let of = |verdict: &Verdict| verdict.nodes.get(index).map(|n| rounded(n.score));
-        let mut good: Vec<f64> = judged.iter().flat_map(|j| &j.good).filter_map(of).collect();
-        // A mode that the node gave up has no say in its threshold.
-        let sought = |kind: &str| node.hypotheses.iter().any(|h| h.fault == kind);
-        let own = |m: &usize| design.components[modes[*m].component].name == node.name && sought(modes[*m].kind.word());
-        let shown = |scene: &Vec<usize>| scene.iter().any(own);
-        let faulty = judged.iter().flat_map(|j| j.faulty.iter().zip(scenes));
-        let mut fault: Vec<f64> =
-            faulty.filter(|(_, scene)| shown(scene)).flat_map(|(verdicts, _)| verdicts).filter_map(of).collect();
-        good.sort_by(f64::total_cmp);
-        fault.sort_by(f64::total_cmp);
-        node.threshold = rounded(threshold(&good, &fault, design.inspect.false_reject / nodes as f64));
-        node.good_scores = good;
-        node.fault_scores = fault;
+        let against = |verdict: &Verdict| verdict.nodes.get(index).map(|n| n.against.clone());
+        let of = |kind: &str| {
+            let own =
+                |m: &usize| design.components[modes[*m].component].name == node.name && modes[*m].kind.word() == kind;
+            let faulty = judged.iter().flat_map(|j| j.faulty.iter().zip(scenes));
+            let shown = faulty.filter(|(_, scene)| scene.iter().any(own));
+            shown.flat_map(|(verdicts, _)| verdicts).filter_map(against).collect()
+        };
+        let good = judged.iter().flat_map(|j| &j.good).filter_map(against).collect();
+        // A mode that the node gave up is none of its hypotheses and has no say.
+        let kinds: BTreeSet<String> = node.hypotheses[1..].iter().map(|h| h.fault.clone()).collect();
+        let faulty = kinds.into_iter().map(|kind| (kind.clone(), of(&kind))).collect();
+        thresholds::set(node, &thresholds::Seen { good, faulty }, design.inspect.false_reject / nodes);
     }
 }
 
@@ -228,31 +221,6 @@ fn scores(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[Er
 fn least_correlation(judged: &[Judged]) -> f64 {
     let lowest = judged.iter().map(|j| j.correlation).fold(f64::INFINITY, f64::min);
     if lowest.is_finite() { rounded((lowest * POOREST_FIT).max(0.0)) } else { 0.0 }
-}
-
-/// The log-likelihood ratio below which a node counts as faulty: its sign decides or, where good and faulty renders lie apart
-/// but below zero, the middle between them; what is more likely good is never rejected. Where their bulk overlaps, no threshold is right: the promised rate
-/// of false rejects is kept by the middle and the spread of the goods, and what escapes is counted. Never a quantile of
-/// the goods: their few lowest scores say nothing about a photo's.
-fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
-    if good.is_empty() || fault.is_empty() {
-        return 0.0;
-    }
-    let (lowest, highest) = (at_share(good, TRIM), at_share(fault, 1.0 - TRIM));
-    if lowest > highest {
-        return if lowest > 0.0 { 0.0 } else { (lowest + highest) / 2.0 };
-    }
-    let middle = at_share(good, 0.5);
-    let mut distances: Vec<f64> = good.iter().map(|g| (g - middle).abs()).collect();
-    distances.sort_by(f64::total_cmp);
-    // The median distance of a normal variable from its mean is 0.6745 standard deviations.
-    let deviation = at_share(&distances, 0.5) / 0.6745;
-    (middle - normal_quantile(1.0 - false_reject) * deviation).min(0.0)
-}
-
-/// The value below which a share of ascending values lies.
-fn at_share(sorted: &[f64], share: f64) -> f64 {
-    sorted[((sorted.len() - 1) as f64 * share).round() as usize]
 }
 
 /// A share of the lowest score that a held-out photo got: a good one, or any where faults take edges from the locator.
@@ -273,7 +241,7 @@ pub(super) fn promise(
     unfit: usize,
 ) -> Promise {
     // The verdicts were taken before the thresholds were known.
-    let faulty = |v: &Verdict, node: usize| v.nodes[node].score < model.nodes[node].threshold;
+    let faulty = |v: &Verdict, node: usize| inspect::score(&model.nodes[node], &v.nodes[node].against).1 < 0.0;
     // Neither does a photo that cannot be judged pass.
     let unsure = |v: &&Verdict| v.decision == Decision::CannotInspect;
     let rejected = |v: &&Verdict| unsure(v) || (0..v.nodes.len()).any(|n| faulty(v, n));
@@ -300,31 +268,5 @@ pub(super) fn promise(
         false_reject: rate(false_rejects as u32, (goods.len() + unfit) as u32),
         escape: rate(escapes, trials),
         modes: rates,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_sign_decides_where_renders_lie_apart() {
-        let good = [-0.3, 0.2, 0.25, 0.3, 0.3, 0.35, 0.4, 0.4, 0.45, 0.5, 0.6];
-        let fault = [-0.9, -0.8, -0.8, -0.7, -0.6, -0.5, -0.5, -0.4, -0.3, -0.2, 0.1];
-        assert_eq!(threshold(&good, &fault, 1e-3), 0.0);
-    }
-
-    #[test]
-    fn the_middle_decides_where_they_lie_apart_below_zero() {
-        assert!((threshold(&[-0.2, -0.1, 0.0], &[-0.8, -0.7, -0.6], 1e-3) + 0.4).abs() < 1e-9);
-        assert_eq!(threshold(&[0.3, 0.4], &[0.1, 0.2], 1e-3), 0.0);
-    }
-
-    #[test]
-    fn where_they_overlap_the_false_rejects_are_kept() {
-        let good = [-0.1, -0.05, 0.0, 0.05, 0.1];
-        let fault = [-0.2, -0.1, 0.0, 0.1];
-        let expected = -3.0902 * 0.05 / 0.6745;
-        assert!((threshold(&good, &fault, 1e-3) - expected).abs() < 1e-3);
     }
 }

@@ -99,6 +99,7 @@ pub fn tiny() -> Model {
     let images = |fault: &str, value: u16| Hypothesis {
         fault: fault.into(),
         sweep: String::new(),
+        threshold: 0.0,
         images: (0..3)
             .map(|draw| model::Image { draw, lamp: 0, rows: vec![Row(vec![7 + draw as u16, 8, value, 10]); 4] })
             .collect(),
@@ -145,7 +146,6 @@ pub fn tiny() -> Model {
             spread: [1.0, 1.0],
             disturbs: vec![],
             steps: vec![0.01],
-            threshold: 0.0,
             good_scores: vec![0.1, 0.2],
             fault_scores: vec![],
             hypotheses: vec![images("good", 90), images("missing", 9)],

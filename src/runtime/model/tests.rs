@@ -7,6 +7,7 @@ pub(crate) fn tiny() -> Model {
     let images = |fault: &str| Hypothesis {
         fault: fault.into(),
         sweep: String::new(),
+        threshold: 0.0,
         images: (0..3).map(|draw| Image { draw, lamp: 0, rows: vec![Row(vec![7, 8, 9, 10]); 4] }).collect(),
     };
     let rate = Rate { events: 0, trials: 10, upper_95: 0.3085 };
@@ -49,7 +50,6 @@ pub(crate) fn tiny() -> Model {
             spread: [1.0, 1.0],
             disturbs: vec![],
             steps: vec![0.01],
-            threshold: 0.0,
             good_scores: vec![],
             fault_scores: vec![],
             hypotheses: vec![images("good"), images("missing")],

@@ -1,0 +1,92 @@
+//! From what held-out renders scored to the thresholds of a node's error modes.
+//!
+//! In: log-likelihood ratios of good and faulty renders against every hypothesis of a node. Out: a threshold per hypothesis, the
+//! same for all of one error mode, and the node's scores. Never looks at an image.
+
+use super::stats::{normal_quantile, rounded};
+use crate::runtime::inspect;
+use crate::runtime::model::Node;
+
+/// Share of the lowest goods and the highest faults left out when asking whether they overlap: photos in which the pose
+/// went wrong, which say nothing about the node.
+const TRIM: f64 = 0.1;
+
+/// What the held-out renders showed of one node: per render the ratio against each hypothesis.
+pub struct Seen {
+    pub good: Vec<Vec<f64>>,
+    /// By error mode.
+    pub faulty: Vec<(String, Vec<Vec<f64>>)>,
+}
+
+/// Writes the thresholds and the scores into the node. `false_reject` is the node's share of what the spec allows. A mode
+/// that hardly differs from the good state must not make the node blind to one that does, so each has its own.
+pub fn set(node: &mut Node, seen: &Seen, false_reject: f64) {
+    let modes = seen.faulty.len().max(1) as f64;
+    for (kind, faulty) in &seen.faulty {
+        let own: Vec<usize> = (1..node.hypotheses.len()).filter(|&h| node.hypotheses[h].fault == *kind).collect();
+        let least = |against: &Vec<f64>| own.iter().map(|&h| against[h]).fold(f64::INFINITY, f64::min);
+        let limit = threshold(&sorted(&seen.good, least), &sorted(faulty, least), false_reject / modes);
+        own.iter().for_each(|&h| node.hypotheses[h].threshold = rounded(limit));
+    }
+    let score = |against: &Vec<f64>| rounded(inspect::score(node, against).1);
+    let faulty: Vec<Vec<f64>> = seen.faulty.iter().flat_map(|(_, of)| of.iter().cloned()).collect();
+    let scores = (sorted(&seen.good, score), sorted(&faulty, score));
+    (node.good_scores, node.fault_scores) = scores;
+}
+
+fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
+    let mut out: Vec<f64> = all.iter().map(value).collect();
+    out.sort_by(f64::total_cmp);
+    out
+}
+
+/// The log-likelihood ratio below which a node counts as faulty in one way: its sign decides or, where good and faulty renders
+/// lie apart but below zero, the middle between them; what is more likely good is never rejected. Where their bulk overlaps,
+/// no threshold is right: the promised rate of false rejects is kept by the middle and the spread of the goods, and what
+/// escapes is counted. Never a quantile of the goods: their few lowest scores say nothing about a photo's.
+fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
+    if good.is_empty() || fault.is_empty() {
+        return 0.0;
+    }
+    let (lowest, highest) = (at_share(good, TRIM), at_share(fault, 1.0 - TRIM));
+    if lowest > highest {
+        return if lowest > 0.0 { 0.0 } else { (lowest + highest) / 2.0 };
+    }
+    let middle = at_share(good, 0.5);
+    let mut distances: Vec<f64> = good.iter().map(|g| (g - middle).abs()).collect();
+    distances.sort_by(f64::total_cmp);
+    // The median distance of a normal variable from its mean is 0.6745 standard deviations.
+    let deviation = at_share(&distances, 0.5) / 0.6745;
+    (middle - normal_quantile(1.0 - false_reject) * deviation).min(0.0)
+}
+
+/// The value below which a share of ascending values lies.
+fn at_share(sorted: &[f64], share: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * share).round() as usize]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sign_decides_where_renders_lie_apart() {
+        let good = [-0.3, 0.2, 0.25, 0.3, 0.3, 0.35, 0.4, 0.4, 0.45, 0.5, 0.6];
+        let fault = [-0.9, -0.8, -0.8, -0.7, -0.6, -0.5, -0.5, -0.4, -0.3, -0.2, 0.1];
+        assert_eq!(threshold(&good, &fault, 1e-3), 0.0);
+    }
+
+    #[test]
+    fn the_middle_decides_where_they_lie_apart_below_zero() {
+        assert!((threshold(&[-0.2, -0.1, 0.0], &[-0.8, -0.7, -0.6], 1e-3) + 0.4).abs() < 1e-9);
+        assert_eq!(threshold(&[0.3, 0.4], &[0.1, 0.2], 1e-3), 0.0);
+    }
+
+    #[test]
+    fn where_they_overlap_the_false_rejects_are_kept() {
+        let good = [-0.1, -0.05, 0.0, 0.05, 0.1];
+        let fault = [-0.2, -0.1, 0.0, 0.1];
+        let expected = -3.0902 * 0.05 / 0.6745;
+        assert!((threshold(&good, &fault, 1e-3) - expected).abs() < 1e-3);
+    }
+}
