@@ -175,6 +175,24 @@ pub enum MaterialKind {
     Matt,
 }
 
+/// Which way the grooves of machining run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Grooves {
+    /// Circles about the axis that a face was turned about.
+    Circular,
+    /// Straight along x (0), y (1) or z (2) of the part's frame.
+    Straight(usize),
+}
+
+/// The lay of a surface (ISO 1302): it is smoother along its grooves than across them, which draws highlights out into
+/// streaks across the grooves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Lay {
+    pub grooves: Grooves,
+    /// GGX alpha along the grooves, as a share of that across them.
+    pub along: f64,
+}
+
 /// How a surface answers light. Ranges are drawn once per component and image: parts differ from one another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Material {
@@ -185,7 +203,7 @@ pub struct Material {
     pub k: f64,
     /// Share of light returned: scales the Fresnel term of a metal; albedo of the body of plastics and matt surfaces.
     pub reflectance: Range,
-    /// GGX alpha (metals, coat of plastics).
+    /// GGX alpha (metals, coat of plastics); across the grooves where there is a lay.
     pub roughness: Range,
     /// Width (mm) of the rounding of convex edges on each of the two faces: no real edge is sharp.
     pub edge_break: Range,
@@ -193,6 +211,9 @@ pub struct Material {
     pub mottle: f64,
     /// Size of the blotches in mm along x, y and z of the part's frame (unequal: grain).
     pub mottle_size: [f64; 3],
+    /// The grooves that machining left. Left out where there are none, so that a design without them serialises as ever.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lay: Option<Lay>,
     #[serde(skip)]
     pub span: Span,
 }

@@ -6,7 +6,8 @@
 //! customer's photo knows the weights. Never draws anything but finishes, never touches a photo.
 
 use super::{Body, Emitter, Finish, Ground, Lamp, Scene};
-use crate::design::model::{CameraSpec, LightShape, LightSpec, Material, Station};
+use super::turning::axes;
+use crate::design::model::{CameraSpec, Grooves, Lay, LightShape, LightSpec, Material, Station};
 use crate::rng::Stream;
 use crate::runtime::camera::{Camera, Vec3, cross, dot, normalise, sub};
 use crate::solid::{Solid, TriMesh};
@@ -100,6 +101,7 @@ pub fn finish_nominal(material: &Material) -> Finish {
         mottle: material.mottle,
         mottle_size: material.mottle_size,
         mottle_seed: 0,
+        lay: material.lay,
     }
 }
 
@@ -129,6 +131,10 @@ pub fn bodies(instance: &Instance, standing: [f64; 4]) -> Vec<Body> {
         pose: stand * instance.poses[component],
         finish: instance.finishes[component].clone(),
         component,
+        axes: match instance.finishes[component].lay {
+            Some(Lay { grooves: Grooves::Circular, .. }) => axes(solid),
+            _ => Arc::default(),
+        },
     };
     present.map(body).collect()
 }
@@ -264,6 +270,7 @@ mod tests {
             edge_break: Range::exactly(0.0),
             mottle: 0.0,
             mottle_size: [1.0; 3],
+            lay: None,
             span: Span::default(),
         }
     }
