@@ -100,10 +100,21 @@ enum Thing {
 #[derive(Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 enum Material {
-    Diffuse { albedo: f64 },
-    Conductor { n: f64, k: f64, alpha: f64 },
+    Diffuse {
+        albedo: f64,
+    },
+    Conductor {
+        n: f64,
+        k: f64,
+        alpha: f64,
+    },
     /// With grooves: circles on a pin, lines along x on a sheet.
-    Grooved { n: f64, k: f64, along: f64, across: f64 },
+    Grooved {
+        n: f64,
+        k: f64,
+        along: f64,
+        across: f64,
+    },
 }
 
 #[derive(Deserialize)]
@@ -197,6 +208,7 @@ fn camera(view: &View, size: [u32; 2]) -> Camera {
         focal: view.f,
         centre: size.map(|n| f64::from(n) / 2.0),
         k1: 0.0,
+        k2: 0.0,
         size,
     }
 }
@@ -213,10 +225,13 @@ fn scene(setup: &Setup) -> Scene {
 
 impl Thing {
     fn body(&self) -> Option<Body> {
-        let turned = |[x, y, z]: [f64; 3]| UnitQuaternion::from_euler_angles(x.to_radians(), y.to_radians(), z.to_radians());
+        let turned =
+            |[x, y, z]: [f64; 3]| UnitQuaternion::from_euler_angles(x.to_radians(), y.to_radians(), z.to_radians());
         let (mesh, pose, finish) = match self {
             Thing::Floor { .. } => return None,
-            Thing::Sphere { center, d, material } => (ball(d / 2.0), Translation3::from(*center).into(), material.finish()),
+            Thing::Sphere { center, d, material } => {
+                (ball(d / 2.0), Translation3::from(*center).into(), material.finish())
+            }
             Thing::Box { size, at, turn, material } => {
                 (block(*size), Isometry3::from_parts(Translation3::from(*at), turned(*turn)), material.finish())
             }

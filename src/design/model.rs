@@ -232,6 +232,19 @@ pub struct CameraSpec {
     pub placing: CameraPlacing,
     /// Radial distortion, radius normalised by half the image width.
     pub k1: Range,
+    /// Its next term, of the fourth power of the radius. This and the next three are left out where they are usual, so that a design
+    /// without them serialises as ever.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub k2: f64,
+    /// Share of light that the lens loses in the corners, falling with the square of the radius.
+    #[serde(skip_serializing_if = "is_none")]
+    pub vignetting: Range,
+    /// Electrons at full scale, which the shot noise follows; infinite where that noise is not asked for.
+    #[serde(skip_serializing_if = "is_endless")]
+    pub full_well: f64,
+    /// Bits of a grey value.
+    #[serde(skip_serializing_if = "is_a_byte")]
+    pub depth: u32,
     /// Installation error: ± mm on each axis of the position, ± rad about each axis.
     pub install_mm: f64,
     pub install_rad: f64,
@@ -240,6 +253,22 @@ pub struct CameraSpec {
     pub response: Response,
     #[serde(skip)]
     pub span: Span,
+}
+
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
+}
+
+fn is_none(range: &Range) -> bool {
+    *range == Range::exactly(0.0)
+}
+
+fn is_endless(number: &f64) -> bool {
+    number.is_infinite()
+}
+
+fn is_a_byte(bits: &u32) -> bool {
+    *bits == 8
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

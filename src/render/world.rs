@@ -247,7 +247,9 @@ impl Lines {
         match lay.map(|lay| lay.grooves) {
             None => Lines::None,
             Some(Grooves::Straight(axis)) => Lines::Straight(to_station.column(axis.min(2)).into_owned()),
-            Some(Grooves::Circular) if axes.is_empty() => Lines::Circles(vec![(origin, to_station.column(2).into_owned())]),
+            Some(Grooves::Circular) if axes.is_empty() => {
+                Lines::Circles(vec![(origin, to_station.column(2).into_owned())])
+            }
             Some(Grooves::Circular) => Lines::Circles(axes.iter().map(placed).collect()),
         }
     }

@@ -5,8 +5,8 @@
 //! and every patch of the room's light is a light group of its own, because images are linear in light and only the
 //! customer's photo knows the weights. Never draws anything but finishes, never touches a photo.
 
-use super::{Body, Emitter, Finish, Ground, Lamp, Scene};
 use super::turning::axes;
+use super::{Body, Emitter, Finish, Ground, Lamp, Scene};
 use crate::design::model::{CameraSpec, Grooves, Lay, LightShape, LightSpec, Material, Station};
 use crate::rng::Stream;
 use crate::runtime::camera::{Camera, Vec3, cross, dot, normalise, sub};
@@ -56,6 +56,7 @@ pub fn camera(spec: &CameraSpec, placing: Placed) -> Camera {
         focal: spec.focal.nominal / spec.pitch,
         centre: spec.image.map(|n| f64::from(n) / 2.0),
         k1: (spec.k1.low + spec.k1.high) / 2.0,
+        k2: spec.k2,
         size: spec.image,
     }
 }
@@ -234,6 +235,10 @@ mod tests {
             aim: [0.0, 0.0, 12.0],
             placing: CameraPlacing::Fixed { distance: 330.0, elevation: 1.08, azimuth: -FRAC_PI_2 },
             k1: Range { low: -0.05, nominal: 0.0, high: 0.0 },
+            k2: 0.0,
+            vignetting: Range::exactly(0.0),
+            full_well: f64::INFINITY,
+            depth: 8,
             install_mm: 1.5,
             install_rad: 0.007,
             blur: Range::exactly(0.5),

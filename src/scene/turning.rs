@@ -69,7 +69,9 @@ mod tests {
 
     #[test]
     fn faces_are_turned_about_their_own_axis_and_ends_about_their_largest_edge() {
-        let faces = turned("add pin = cylinder(d = 10, h = 20) at (3, 4, 0) turn (90 deg, 0, 0)\ncut bore = cylinder(d = 4, h = through) at (3, 0, 2) turn (90 deg, 0, 0)");
+        let faces = turned(
+            "add pin = cylinder(d = 10, h = 20) at (3, 4, 0) turn (90 deg, 0, 0)\ncut bore = cylinder(d = 4, h = through) at (3, 0, 2) turn (90 deg, 0, 0)",
+        );
         for (name, axis) in &faces {
             let at = if name.starts_with("bore") { [3.0, 0.0, 2.0] } else { [3.0, 0.0, 0.0] };
             assert!(through(axis, at, [0.0, 1.0, 0.0]), "{name}: {axis:?}");
