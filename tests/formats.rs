@@ -156,6 +156,147 @@ fn giants_are_refused_before_anything_is_allocated() {
     }
 }
 
+/// CRC-32 of a PNG chunk.
+fn crc(bytes: &[u8]) -> u32 {
+    let bit = |c: u32| if c & 1 == 1 { c >> 1 ^ 0xedb8_8320 } else { c >> 1 };
+    !bytes.iter().fold(u32::MAX, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), |c, _| bit(c)))
+}
+
+fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let named = [kind, data].concat();
+    [&(data.len() as u32).to_be_bytes()[..], &named, &crc(&named).to_be_bytes()].concat()
+}
+
+/// A zlib stream of stored blocks (RFC 1950, RFC 1951).
+fn stored(data: &[u8]) -> Vec<u8> {
+    let mut out = vec![0x78, 0x01];
+    let pieces = data.chunks(0xffff).count();
+    for (i, piece) in data.chunks(0xffff).enumerate() {
+        let length = piece.len() as u16;
+        out.push(u8::from(i + 1 == pieces));
+        out.extend([length.to_le_bytes(), (!length).to_le_bytes()].concat());
+        out.extend(piece);
+    }
+    let (a, b) = data.iter().fold((1u32, 0u32), |(a, b), &v| {
+        let a = (a + u32::from(v)) % 65_521;
+        (a, (b + a) % 65_521)
+    });
+    out.extend((b << 16 | a).to_be_bytes());
+    out
+}
+
+/// A PNG file of rows that are packed already.
+fn png(depth: u8, kind: u8, between: &[Vec<u8>], rows: impl Iterator<Item = Vec<u8>>) -> Vec<u8> {
+    let head = [&SIZE[0].to_be_bytes()[..], &SIZE[1].to_be_bytes(), &[depth, kind, 0, 0, 0]].concat();
+    let data: Vec<u8> = rows.flat_map(|row| [&[0][..], &row].concat()).collect();
+    let parts = [chunk(b"IHDR", &head), between.concat(), chunk(b"IDAT", &stored(&data)), chunk(b"IEND", &[])];
+    [b"\x89PNG\r\n\x1a\n".to_vec(), parts.concat()].concat()
+}
+
+fn grey_rows() -> Vec<Vec<u8>> {
+    scene().to_luma8().into_raw().chunks_exact(SIZE[0] as usize).map(<[u8]>::to_vec).collect()
+}
+
+/// The scene in 8 bits, written by hand in ways that no encoder at hand writes.
+#[test]
+fn palettes_odd_depths_and_rows_either_way_up_are_read() {
+    let expected =
+        Photo::decode(&encoded(&scene().to_luma8().into(), ImageFormat::Png), Tone::Linear, SIZE).unwrap().light;
+    // A palette that holds its greys backwards.
+    let palette: Vec<u8> = (0..=255u8).rev().flat_map(|v| [v; 3]).collect();
+    let turned = grey_rows().into_iter().map(|row| row.into_iter().map(|v| 255 - v).collect());
+    let indexed = png(8, 3, &[chunk(b"PLTE", &palette)], turned);
+    // A bitmap with its rows from the top down: height is negative.
+    let upward = encoded(&scene().to_rgb8().into(), ImageFormat::Bmp);
+    let start = u32::from_le_bytes(upward[10..14].try_into().unwrap()) as usize;
+    let row = (SIZE[0] as usize * 3).next_multiple_of(4);
+    let mut downward = upward[..start].to_vec();
+    downward[22..26].copy_from_slice(&(-(SIZE[1] as i32)).to_le_bytes());
+    downward.extend(upward[start..].chunks_exact(row).rev().flatten());
+    assert_ne!(upward, downward);
+    for (name, file) in [("palette", indexed), ("bottom up", upward), ("top down", downward)] {
+        let photo = Photo::decode(&file, Tone::Linear, SIZE).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(photo.light, expected, "{name}");
+    }
+    // One, two and four bits of grey.
+    for depth in [1u8, 2, 4] {
+        let deepest = (1u16 << depth) - 1;
+        let level = |v: &u8| (u16::from(*v) * deepest + 127) / 255;
+        let packed = |row: Vec<u8>| {
+            let per_byte = 8 / usize::from(depth);
+            let byte = |values: &[u8]| {
+                let bits = values.iter().fold(0u16, |bits, v| bits << depth | level(v));
+                (bits << (usize::from(depth) * (per_byte - values.len()))) as u8
+            };
+            row.chunks(per_byte).map(byte).collect::<Vec<u8>>()
+        };
+        let photo =
+            Photo::decode(&png(depth, 0, &[], grey_rows().into_iter().map(packed)), Tone::Linear, SIZE).unwrap();
+        let wanted: Vec<f32> = grey_rows().concat().iter().map(|v| f32::from(level(v)) / f32::from(deepest)).collect();
+        assert!(furthest(&photo.light.values, &wanted) < 1e-6, "{depth} bits");
+    }
+}
+
+/// EXIF with an orientation and nothing else.
+fn exif(orientation: u8) -> Vec<u8> {
+    let entry = [0x12, 0x01, 3, 0, 1, 0, 0, 0, orientation, 0, 0, 0];
+    [&b"II*\0"[..], &[8, 0, 0, 0, 1, 0], &entry, &[0; 4]].concat()
+}
+
+#[test]
+fn photos_are_turned_the_way_the_camera_was_held() {
+    let upright = scene().to_luma8();
+    let size = [SIZE[1], SIZE[0]];
+    // What a camera stores that was held so: the upright picture after the inverse of what a viewer does.
+    let cases: [(u8, DynamicImage, [u32; 2]); 4] = [
+        (1, upright.clone().into(), SIZE),
+        (3, image::imageops::rotate180(&upright).into(), SIZE),
+        (6, image::imageops::rotate270(&upright).into(), size),
+        (8, image::imageops::rotate90(&upright).into(), size),
+    ];
+    let expected = Photo::decode(&encoded(&upright.into(), ImageFormat::Png), Tone::Linear, SIZE).unwrap().light;
+    for (orientation, stored, stored_size) in cases {
+        let mut file = encoded(&stored, ImageFormat::Png);
+        assert!(Photo::decode(&file, Tone::Linear, stored_size).is_ok());
+        // Behind the header of 8 bytes and the IHDR chunk of 25.
+        file.splice(33..33, chunk(b"eXIf", &exif(orientation)));
+        let photo = Photo::decode(&file, Tone::Linear, SIZE).unwrap_or_else(|e| panic!("{orientation}: {e}"));
+        assert_eq!(photo.light, expected, "PNG, orientation {orientation}");
+
+        let mut file = encoded(&stored, ImageFormat::Jpeg);
+        let data = [&b"Exif\0\0"[..], &exif(orientation)].concat();
+        let segment = [&[0xff, 0xe1][..], &(data.len() as u16 + 2).to_be_bytes(), &data].concat();
+        file.splice(2..2, segment);
+        let photo = Photo::decode(&file, Tone::Linear, SIZE).unwrap_or_else(|e| panic!("{orientation}: {e}"));
+        assert!(furthest(&photo.light.values, &expected.values) < 0.25, "JPEG, orientation {orientation}");
+    }
+}
+
+#[test]
+fn a_photo_for_print_is_refused_in_words() {
+    let error = Photo::decode(include_bytes!("data/cmyk.jpg"), Tone::Linear, SIZE).unwrap_err().to_string();
+    assert!(error.contains("CMYK") && error.contains("grey or RGB"), "{error}");
+}
+
+#[test]
+fn grey_is_the_same_light_in_every_lossless_file() {
+    for tone in [Tone::Linear, Tone::Srgb] {
+        let light = |image: DynamicImage, format| Photo::decode(&encoded(&image, format), tone, SIZE).unwrap().light;
+        let grey = DynamicImage::from(scene().to_luma8());
+        let deep = DynamicImage::from(grey.to_luma16());
+        let expected = light(grey.clone(), ImageFormat::Png);
+        for format in [ImageFormat::Png, ImageFormat::Tiff, ImageFormat::Bmp] {
+            assert_eq!(light(grey.clone(), format), expected, "{format:?} grey");
+            assert_eq!(light(grey.to_rgb8().into(), format), expected, "{format:?} colour");
+            assert_eq!(light(grey.to_rgba8().into(), format), expected, "{format:?} colour with alpha");
+        }
+        for format in [ImageFormat::Png, ImageFormat::Tiff] {
+            assert_eq!(light(deep.clone(), format), expected, "{format:?} grey, 16 bits");
+            assert_eq!(light(deep.to_rgb16().into(), format), expected, "{format:?} colour, 16 bits");
+        }
+    }
+}
+
 #[test]
 fn what_is_no_photo_is_told_in_words() {
     let told = |bytes: &[u8]| Photo::decode(bytes, Tone::Linear, SIZE).unwrap_err().to_string();

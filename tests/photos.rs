@@ -120,6 +120,36 @@ fn formats_other_than_png_are_judged_alike() {
     assert!(code == 1 && lines.len() == 4 && lines.iter().all(|l| l.ends_with("no-go")), "{lines:?}");
 }
 
+/// The whole line, whatever the file was called and however long it took.
+#[test]
+fn the_same_photo_in_every_lossless_format_has_the_same_verdict_to_the_last_digit() {
+    let dir = fresh("lossless");
+    for from in ["good.png", "missing.png"] {
+        let grey = image::DynamicImage::from(image::open(folder().join(from)).unwrap().to_luma8());
+        let kinds: [(&str, image::DynamicImage); 3] =
+            [("grey", grey.clone()), ("colour", grey.to_rgb8().into()), ("alpha", grey.to_rgba8().into())];
+        for (name, image) in &kinds {
+            for end in ["png", "bmp", "tif"] {
+                image.save(dir.join(format!("{name}.{end}"))).unwrap();
+            }
+        }
+        for end in ["png", "tif"] {
+            image::DynamicImage::from(grey.to_luma16()).save(dir.join(format!("deep.{end}"))).unwrap();
+        }
+        let output = command(&["lossless"]).stdin(Stdio::null()).output().unwrap();
+        let bare = |line: &str| {
+            let mut line: serde_json::Value = serde_json::from_str(line).unwrap();
+            let fields = line.as_object_mut().unwrap();
+            fields.remove("photo").unwrap();
+            fields.remove("milliseconds").unwrap();
+            line
+        };
+        let lines: Vec<_> = std::str::from_utf8(&output.stdout).unwrap().lines().map(bare).collect();
+        assert_eq!(lines.len(), 11);
+        assert!(lines.iter().all(|l| *l == lines[0]), "{from}: {lines:#?}");
+    }
+}
+
 #[test]
 fn two_photos_of_one_stem_in_a_list_cannot_share_an_overlay() {
     let dir = fresh("stems");

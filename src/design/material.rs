@@ -1,9 +1,10 @@
 //! `material`: how a surface answers light.
 
 use super::fields::Fields;
-use super::model::{Material, MaterialKind};
+use super::model::{Grooves, Lay, Material, MaterialKind};
 use super::scope::Resolver;
-use crate::syntax::ast::{Body, Name};
+use crate::diag::Diagnostic;
+use crate::syntax::ast::{Body, Name, Value};
 use crate::units::{Quantity, Range};
 
 /// Complex refractive indices near 0.6 µm, where white light and a monochrome sensor have their weight. Rounded from
@@ -21,8 +22,22 @@ const BLOTCH: f64 = 8.0;
 /// Broken edges when nothing is said (mm): what a deburring tool leaves.
 const EDGE_BREAK: Range = Range { low: 0.05, nominal: 0.1, high: 0.2 };
 
-const FIELDS: [&str; 9] =
-    ["kind", "metal", "n", "k", "reflectance", "roughness", "edge_break", "mottle", "mottle_size"];
+/// Roughness along the grooves as a share of that across them, when nothing is said: what a sharp tool leaves.
+const ALONG: f64 = 0.3;
+
+const FIELDS: [&str; 11] = [
+    "kind",
+    "metal",
+    "n",
+    "k",
+    "reflectance",
+    "roughness",
+    "edge_break",
+    "mottle",
+    "mottle_size",
+    "lay",
+    "lay_roughness",
+];
 
 impl Resolver {
     pub fn material(&mut self, name: &Name, body: &Body) -> Material {
@@ -46,14 +61,48 @@ impl Resolver {
             edge_break: self.range_within(&fields, "edge_break", Quantity::Length, EDGE_BREAK, [0.0, 10.0]),
             mottle: self.exact_or(&fields, "mottle", Quantity::Ratio, 0.0, [0.0, 1.0]),
             mottle_size: self.mottle_size(&fields),
+            lay: self.lay(&fields, kind),
             span: name.span,
+        }
+    }
+
+    /// The grooves of machining: `lay = circular`, or along an axis.
+    fn lay(&mut self, fields: &Fields, kind: MaterialKind) -> Option<Lay> {
+        let words = [
+            ("none", None),
+            ("circular", Some(Grooves::Circular)),
+            ("x", Some(Grooves::Straight(0))),
+            ("y", Some(Grooves::Straight(1))),
+            ("z", Some(Grooves::Straight(2))),
+        ];
+        let grooves = self.word_or(fields, "lay", &words, None);
+        let along = self.exact_or(fields, "lay_roughness", Quantity::Ratio, ALONG, [0.01, 1.0]);
+        match (fields.get("lay"), fields.get("lay_roughness")) {
+            (Some(value), _) if grooves.is_some() && kind != MaterialKind::Metal => {
+                self.report(
+                    Diagnostic::error("E0211", value.span(), "only a metal has a lay")
+                        .label("not a metal")
+                        .help("write `kind = metal`, or leave `lay` out"),
+                );
+                None
+            }
+            (None, Some(value)) => {
+                let message = "`lay_roughness` is along the grooves, and there are none";
+                self.report(
+                    Diagnostic::error("E0211", value.span(), message)
+                        .label("without a `lay`")
+                        .help("write `lay = circular` for a turned part, `lay = x` for one that is ground along x"),
+                );
+                None
+            }
+            _ => grooves.map(|grooves| Lay { grooves, along }),
         }
     }
 
     /// One size for round blotches, or three for grain.
     fn mottle_size(&mut self, fields: &Fields) -> [f64; 3] {
         let sizes = match fields.get("mottle_size") {
-            Some(crate::syntax::ast::Value::Dim(_)) => {
+            Some(Value::Dim(_)) => {
                 [self.exact_or(fields, "mottle_size", Quantity::Length, BLOTCH, [0.01, f64::MAX]); 3]
             }
             _ => self.point_or(fields, "mottle_size", [BLOTCH; 3]),

@@ -175,6 +175,24 @@ pub enum MaterialKind {
     Matt,
 }
 
+/// Which way the grooves of machining run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Grooves {
+    /// Circles about the axis that a face was turned about.
+    Circular,
+    /// Straight along x (0), y (1) or z (2) of the part's frame.
+    Straight(usize),
+}
+
+/// The lay of a surface (ISO 1302): it is smoother along its grooves than across them, which draws highlights out into
+/// streaks across the grooves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Lay {
+    pub grooves: Grooves,
+    /// GGX alpha along the grooves, as a share of that across them.
+    pub along: f64,
+}
+
 /// How a surface answers light. Ranges are drawn once per component and image: parts differ from one another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Material {
@@ -185,7 +203,7 @@ pub struct Material {
     pub k: f64,
     /// Share of light returned: scales the Fresnel term of a metal; albedo of the body of plastics and matt surfaces.
     pub reflectance: Range,
-    /// GGX alpha (metals, coat of plastics).
+    /// GGX alpha (metals, coat of plastics); across the grooves where there is a lay.
     pub roughness: Range,
     /// Width (mm) of the rounding of convex edges on each of the two faces: no real edge is sharp.
     pub edge_break: Range,
@@ -193,6 +211,9 @@ pub struct Material {
     pub mottle: f64,
     /// Size of the blotches in mm along x, y and z of the part's frame (unequal: grain).
     pub mottle_size: [f64; 3],
+    /// The grooves that machining left. Left out where there are none, so that a design without them serialises as ever.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lay: Option<Lay>,
     #[serde(skip)]
     pub span: Span,
 }
@@ -211,6 +232,19 @@ pub struct CameraSpec {
     pub placing: CameraPlacing,
     /// Radial distortion, radius normalised by half the image width.
     pub k1: Range,
+    /// Its next term, of the fourth power of the radius. This and the next three are left out where they are usual, so that a design
+    /// without them serialises as ever.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub k2: f64,
+    /// Share of light that the lens loses in the corners, falling with the square of the radius.
+    #[serde(skip_serializing_if = "is_none")]
+    pub vignetting: Range,
+    /// Electrons at full scale, which the shot noise follows; infinite where that noise is not asked for.
+    #[serde(skip_serializing_if = "is_endless")]
+    pub full_well: f64,
+    /// Bits of a grey value.
+    #[serde(skip_serializing_if = "is_a_byte")]
+    pub depth: u32,
     /// Installation error: ± mm on each axis of the position, ± rad about each axis.
     pub install_mm: f64,
     pub install_rad: f64,
@@ -219,6 +253,22 @@ pub struct CameraSpec {
     pub response: Response,
     #[serde(skip)]
     pub span: Span,
+}
+
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
+}
+
+fn is_none(range: &Range) -> bool {
+    *range == Range::exactly(0.0)
+}
+
+fn is_endless(number: &f64) -> bool {
+    number.is_infinite()
+}
+
+fn is_a_byte(bits: &u32) -> bool {
+    *bits == 8
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

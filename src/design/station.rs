@@ -16,11 +16,38 @@ const MAX_SIDE: u64 = 8192;
 const POSITIVE: [f64; 2] = [f64::MIN_POSITIVE, f64::MAX];
 const ANY: [f64; 2] = [f64::MIN, f64::MAX];
 
+/// Steps (half image widths) in which a lens is searched for the radius from which on it folds the image over.
+const FOLD_STEP: f64 = 0.05;
+/// There the seen radius grows by less than this share of the true one.
+const LEAST_GROWTH: f64 = 0.1;
+
+/// A lens that loses more light than this share in the corners shows nothing there.
+const MOST_VIGNETTING: f64 = 0.9;
+
 /// Drift of a lamp whose spec does not say, ± this share.
 const DRIFT: f64 = 0.1;
 
-const CAMERA_FIELDS: [&str; 12] =
-    ["image", "focal", "pitch", "aim", "distance", "elevation", "azimuth", "k1", "offset", "tilt", "blur", "response"];
+/// A sensor whose wells hold fewer electrons than this is a typing error; most hold some ten thousand.
+const LEAST_WELL: f64 = 100.0;
+
+const CAMERA_FIELDS: [&str; 16] = [
+    "image",
+    "focal",
+    "pitch",
+    "aim",
+    "distance",
+    "elevation",
+    "azimuth",
+    "k1",
+    "k2",
+    "vignetting",
+    "offset",
+    "tilt",
+    "blur",
+    "response",
+    "full_well",
+    "depth",
+];
 
 impl Resolver {
     pub fn station(&mut self, name: &Name, body: &Body, materials: &BTreeMap<&str, usize>) -> Station {
@@ -76,13 +103,28 @@ impl Resolver {
         let fields = Fields::of_body("camera", head(span), body);
         self.check_fields(&fields, &CAMERA_FIELDS);
         let responses = [("linear", Response::Linear), ("srgb", Response::Srgb)];
+        let image = self.image(&fields);
+        let k1 = self.range_within(&fields, "k1", Quantity::Ratio, Range::exactly(0.0), [-0.3, 0.3]);
         CameraSpec {
-            image: self.image(&fields),
+            image,
             focal: self.range_within(&fields, "focal", Quantity::Length, Range::symmetric(16.0, 0.08), POSITIVE),
             pitch: self.exact_or(&fields, "pitch", Quantity::Length, 0.0074, POSITIVE),
             aim: self.point_or(&fields, "aim", [0.0; 3]),
             placing: self.placing(&fields, mode.is_some_and(|m| m.text == "auto")),
-            k1: self.range_within(&fields, "k1", Quantity::Ratio, Range::exactly(0.0), [-0.3, 0.3]),
+            k1,
+            k2: self.second_term(&fields, &k1, image),
+            vignetting: self.range_within(
+                &fields,
+                "vignetting",
+                Quantity::Ratio,
+                Range::exactly(0.0),
+                [0.0, MOST_VIGNETTING],
+            ),
+            full_well: match fields.get("full_well") {
+                Some(_) => self.exact_or(&fields, "full_well", Quantity::Ratio, LEAST_WELL, [LEAST_WELL, f64::MAX]),
+                None => f64::INFINITY,
+            },
+            depth: self.whole_or(&fields, "depth", 8, [8, 16]) as u32,
             install_mm: self.error_of(&fields, "offset", Quantity::Length, 1.0),
             install_rad: self.error_of(&fields, "tilt", Quantity::Angle, 0.3f64.to_radians()),
             blur: self.range_within(
@@ -94,6 +136,31 @@ impl Resolver {
             ),
             response: self.word_or(&fields, "response", &responses, Response::Linear),
             span,
+        }
+    }
+
+    /// `k2`, unless the lens would show one point in two places of the image.
+    fn second_term(&mut self, fields: &Fields, k1: &Range, [width, height]: [u32; 2]) -> f64 {
+        let k2 = self.exact_or(fields, "k2", Quantity::Ratio, 0.0, [-0.3, 0.3]);
+        let corner = 1f64.hypot(f64::from(height) / f64::from(width));
+        // From the middle outwards the seen radius has to grow with the true one until it reaches the corners.
+        let grows = |k1: f64| {
+            let mut radii = (0..).map(|i| f64::from(i) * FOLD_STEP);
+            let bends = |r2: f64| 1.0 + 3.0 * k1 * r2 + 5.0 * k2 * r2 * r2 < LEAST_GROWTH;
+            let end = radii.find(|r| bends(r * r) || r * (1.0 + k1 * r * r + k2 * r.powi(4)) > corner);
+            end.is_some_and(|r| !bends(r * r))
+        };
+        match fields.get("k2") {
+            Some(value) if k2 != 0.0 && !(grows(k1.low) && grows(k1.high)) => {
+                let message = format!("with k2 = {k2} the lens folds the image over within its corners");
+                self.report(
+                    Diagnostic::error("E0211", value.span(), message)
+                        .label("bends too much with this `k1`")
+                        .help("radii are in half image widths, not in tangents: lenses have a k2 of some hundredths"),
+                );
+                0.0
+            }
+            _ => k2,
         }
     }
 

@@ -228,6 +228,12 @@ pub const OWNERS: &[Owner] = &[
             arg("edge_break", Length, "width of the rounding of convex edges; 0.05 .. 0.2 mm"),
             arg("mottle", Ratio, "relative amplitude of blotches and grain; 0"),
             arg("mottle_size", Length, "size of the blotches, or `(x, y, z)` for grain; 8 mm"),
+            arg(
+                "lay",
+                OneOf(&["none", "circular", "x", "y", "z"]),
+                "grooves of machining on a metal: round the axis of each face, or along an axis of the part; none",
+            ),
+            arg("lay_roughness", Ratio, "roughness along the grooves as a share of that across them; 0.3"),
         ],
     },
     Owner {
@@ -262,10 +268,14 @@ pub const OWNERS: &[Owner] = &[
             arg("elevation", Angle, "above the horizon; 90 deg"),
             arg("azimuth", Angle, "where the camera stands, from +x towards +y; -90 deg"),
             arg("k1", Ratio, "radial distortion, radius in half image widths; 0"),
+            arg("k2", Ratio, "its next term, with the fourth power of the radius; 0"),
+            arg("vignetting", Ratio, "share of light that the lens loses in the corners; 0"),
             arg("offset", Length, "error of the installation in each axis; 0 ±1 mm"),
             arg("tilt", Angle, "error of the installation about each axis; 0 ±0.3 deg"),
             arg("blur", Pixels, "standard deviation of the point spread; 0.3 .. 0.8 px"),
             arg("response", OneOf(&["linear", "srgb"]), "of the sensor to light; linear"),
+            arg("full_well", Ratio, "electrons at full scale, for shot noise; none"),
+            arg("depth", Whole, "bits of a grey value, 8 to 16; 8"),
         ],
     },
     Owner {

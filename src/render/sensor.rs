@@ -1,4 +1,4 @@
-//! The sensor: linear light becomes a photo of eight bits.
+//! The sensor: linear light becomes a photo of 8 to 16 bits.
 //!
 //! In: [`LightImages`], a weight per light group, [`Sensor`]. Out: a grey image of the rendered pixels. The order is that of
 //! light itself: sum of the lamps, point spread of the lens, vignetting, exposure, shot and read noise, saturation,
@@ -7,7 +7,8 @@
 use super::LightImages;
 use crate::design::model::Response;
 use crate::rng::Stream;
-use image::GrayImage;
+use crate::runtime::camera::let_through;
+use image::{GrayImage, ImageBuffer, Luma};
 
 /// The point spread is cut off at this many standard deviations.
 const SPREAD_REACH: f32 = 3.5;
@@ -24,37 +25,57 @@ pub struct Sensor {
     /// Electrons at full scale: the variance of shot noise is signal over this, in squares of full scale. Infinite for none.
     pub full_well: f64,
     pub response: Response,
+    /// Bits of a grey value: 8 to 16.
+    pub depth: u32,
 }
 
 impl Sensor {
     /// A camera without blur, noise or vignetting.
     pub fn ideal() -> Sensor {
-        Sensor { blur: 0.0, vignetting: 0.0, read_noise: 0.0, full_well: f64::INFINITY, response: Response::Linear }
+        Sensor {
+            blur: 0.0,
+            vignetting: 0.0,
+            read_noise: 0.0,
+            full_well: f64::INFINITY,
+            response: Response::Linear,
+            depth: 8,
+        }
     }
 
-    /// The photo. `weights[g]` is the grey (share of full scale) that radiance 1 of light group `g` gives; groups without a
+    /// The photo in 8 bits. `weights[g]` is the grey (share of full scale) that radiance 1 of light group `g` gives; groups without a
     /// weight are dark. `seed` names the noise.
     pub fn expose(&self, images: &LightImages, weights: &[f64], seed: u64) -> GrayImage {
         let [width, height] = images.size();
-        let mut light = combine(images, weights);
-        blur(&mut light, width as usize, height as usize, self.blur as f32);
-        let mut grey = Vec::with_capacity(light.len());
-        for (row, values) in light.chunks(width.max(1) as usize).enumerate() {
-            let mut noise = Stream::new(seed, "sensor", row as u64);
-            for (column, &value) in values.iter().enumerate() {
-                let signal = f64::from(value) * self.lens(images, column, row);
-                grey.push(self.quantise(self.noisy(signal, &mut noise)));
-            }
-        }
+        let levels = self.levels(images, weights, seed);
+        let grey = levels.iter().map(|level| (level * 255.0).round() as u8).collect();
         GrayImage::from_raw(width, height, grey).unwrap_or_default()
     }
 
-    /// Share of light that the lens lets through to a pixel of the crop.
-    fn lens(&self, images: &LightImages, column: usize, row: usize) -> f64 {
-        let half = [f64::from(images.width) / 2.0, f64::from(images.height) / 2.0];
-        let x = f64::from(images.crop[0]) + column as f64 + 0.5 - half[0];
-        let y = f64::from(images.crop[1]) + row as f64 + 0.5 - half[1];
-        1.0 - self.vignetting * (x * x + y * y) / (half[0] * half[0] + half[1] * half[1])
+    /// The photo in 16 bits, whose values are the `depth` bits of the sensor spread over the whole scale.
+    pub fn expose_deep(&self, images: &LightImages, weights: &[f64], seed: u64) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+        let [width, height] = images.size();
+        let deepest = f64::from((1_u32 << self.depth.clamp(8, 16)) - 1);
+        let value = |level: &f64| ((level * deepest).round() / deepest * f64::from(u16::MAX)).round() as u16;
+        let grey = self.levels(images, weights, seed).iter().map(value).collect();
+        ImageBuffer::from_raw(width, height, grey).unwrap_or_default()
+    }
+
+    /// What the sensor answers before its values are rounded: 0 to 1, row by row.
+    fn levels(&self, images: &LightImages, weights: &[f64], seed: u64) -> Vec<f64> {
+        let [width, height] = images.size();
+        let mut light = combine(images, weights);
+        blur(&mut light, width as usize, height as usize, self.blur as f32);
+        let mut levels = Vec::with_capacity(light.len());
+        for (row, values) in light.chunks(width.max(1) as usize).enumerate() {
+            let mut noise = Stream::new(seed, "sensor", row as u64);
+            for (column, &value) in values.iter().enumerate() {
+                let place =
+                    [f64::from(images.crop[0]) + column as f64 + 0.5, f64::from(images.crop[1]) + row as f64 + 0.5];
+                let signal = f64::from(value) * let_through(self.vignetting, [images.width, images.height], place);
+                levels.push(self.answer(self.noisy(signal, &mut noise)));
+            }
+        }
+        levels
     }
 
     /// Shot and read noise; a full well of some thousand electrons makes Poisson's distribution a normal one.
@@ -63,12 +84,11 @@ impl Sensor {
         if variance > 0.0 { signal + variance.sqrt() * noise.normal() } else { signal }
     }
 
-    fn quantise(&self, signal: f64) -> u8 {
-        let level = match self.response {
+    fn answer(&self, signal: f64) -> f64 {
+        match self.response {
             Response::Linear => signal.clamp(0.0, 1.0),
             Response::Srgb => srgb(signal.clamp(0.0, 1.0)),
-        };
-        (level * 255.0).round() as u8
+        }
     }
 }
 
@@ -155,6 +175,23 @@ mod tests {
         assert_eq!([0.0, 1.0, 2.0, 4.0, 8.0].map(level), [0, 64, 128, 255, 255]);
         let srgb = Sensor { response: Response::Srgb, ..Sensor::ideal() };
         assert_eq!(srgb.expose(&flat(0.2159, 4), &[1.0], 0).get_pixel(0, 0).0[0], 128);
+    }
+
+    #[test]
+    fn deep_photos_have_the_levels_of_their_sensor() {
+        for depth in [8, 10, 12, 16] {
+            let steps = f64::from((1_u32 << depth) - 1);
+            let photo = Sensor { depth, read_noise: 0.1, ..Sensor::ideal() }.expose_deep(&flat(0.25, 64), &[2.0], 1);
+            let level = |v: u16| f64::from(v) / 65_535.0 * steps;
+            assert!(
+                photo.pixels().all(|p| (level(p.0[0]) - level(p.0[0]).round()).abs() < 0.5 * steps / 65_535.0 + 1e-6)
+            );
+            let distinct: std::collections::BTreeSet<u16> = photo.pixels().map(|p| p.0[0]).collect();
+            assert!(distinct.len() as f64 > (steps / 4.0).min(1500.0), "{depth}: {}", distinct.len());
+        }
+        let (deep, shallow) = (Sensor { depth: 8, ..Sensor::ideal() }, flat(0.3, 4));
+        assert_eq!(deep.expose_deep(&shallow, &[1.0], 0).get_pixel(1, 1).0[0] / 257, 77);
+        assert_eq!(deep.expose(&shallow, &[1.0], 0).get_pixel(1, 1).0[0], 77);
     }
 
     #[test]

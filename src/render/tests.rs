@@ -1,8 +1,10 @@
 //! The renderer against closed forms, against itself by other ways, and against energy.
 
+mod rays;
+
 use super::bsdf::Bsdf;
 use super::*;
-use crate::design::model::MaterialKind;
+use crate::design::model::{Grooves, Lay, MaterialKind};
 use crate::scene::{Body, Emitter, Finish, Ground, Lamp};
 use crate::solid::TriMesh;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -11,7 +13,8 @@ use std::sync::Arc;
 
 fn finish(kind: MaterialKind, reflectance: f64, roughness: f64) -> Finish {
     let mottle_size = [5.0; 3];
-    Finish { kind, n: 0.0, k: 1.0, reflectance, roughness, mottle: 0.0, mottle_size, mottle_seed: 1, edge_break: 0.0 }
+    let [n, k, mottle, edge_break] = [0.0, 1.0, 0.0, 0.0];
+    Finish { kind, n, k, reflectance, roughness, mottle, mottle_size, mottle_seed: 1, edge_break, lay: None }
 }
 
 fn ground(finish: Finish) -> Option<Ground> {
@@ -57,12 +60,13 @@ fn cylinder(radius: f64, height: f64, segments: u32) -> TriMesh {
 }
 
 fn body(mesh: TriMesh, at: [f64; 3], finish: Finish) -> Body {
-    Body { mesh: Arc::new(mesh), pose: Translation3::from(at).into(), finish, component: 0 }
+    Body { mesh: Arc::new(mesh), pose: Translation3::from(at).into(), finish, component: 0, axes: Arc::default() }
 }
 
-/// A metal pin beside a matt one on mottled ground, under a ring, a panel and the sky, each in its own group.
+/// A turned metal pin beside a matt one on mottled ground, under a ring, a panel and the sky, each in its own group.
 fn small_scene() -> Scene {
-    let metal = finish(MaterialKind::Metal, 0.9, 0.2);
+    let lay = Some(Lay { grooves: Grooves::Circular, along: 0.4 });
+    let metal = Finish { lay, ..finish(MaterialKind::Metal, 0.9, 0.25) };
     let plate = Finish { mottle: 0.3, ..finish(MaterialKind::Plastic, 0.4, 0.2) };
     Scene {
         bodies: vec![
@@ -151,7 +155,7 @@ fn rough_metal_under_a_white_sky_returns_its_albedo() {
     };
     let camera = Camera::look_at([0.0, -80.0, 60.0], [0.0; 3], 1e5, [8, 8]);
     let (mean, error) = replicated(&scene, &camera, &Settings::exact(64, 3), Strategy::Both)[0];
-    let exact = albedo(Bsdf::Metal { alpha: 0.3, n: 0.0, k: 1.0, scale: 1.0 }, 0.6);
+    let exact = albedo(Bsdf::Metal { alpha: [0.3; 2], n: 0.0, k: 1.0, scale: 1.0 }, 0.6);
     assert!((mean - exact).abs() < 4.0 * error + 1e-3, "{mean} ± {error}, by quadrature {exact}");
 }
 
@@ -274,6 +278,79 @@ fn production_settings_cost_little_energy() {
     for (a, b) in exact.iter().zip(&held) {
         assert!((b.0 / a.0 - 1.0).abs() < 0.01, "{exact:?} {held:?}");
     }
+}
+
+/// A grooved floor whose grooves run along x shines as its BSDF says in its own frame; a quarter turn further it is another.
+#[test]
+fn grooved_metal_returns_its_albedo_by_the_direction_of_its_grooves() {
+    let seen = |axis: usize| {
+        let lay = Some(Lay { grooves: Grooves::Straight(axis), along: 0.2 });
+        let scene = Scene {
+            bodies: Vec::new(),
+            ground: ground(Finish { lay, ..finish(MaterialKind::Metal, 1.0, 0.6) }),
+            lamps: vec![whole_sky(0)],
+            groups: 1,
+        };
+        let camera = Camera::look_at([0.0, -80.0, 60.0], [0.0; 3], 1e5, [8, 8]);
+        replicated(&scene, &camera, &Settings::exact(64, 3), Strategy::Both)[0]
+    };
+    let metal = |alpha| Bsdf::Metal { alpha, n: 0.0, k: 1.0, scale: 1.0 };
+    // The viewer stands at -y: across grooves along x, along grooves along y. `albedo` looks along x of the BSDF's frame.
+    for (axis, alpha) in [(0, [0.6, 0.12]), (1, [0.12, 0.6]), (2, [0.6, 0.6])] {
+        let (exact, (mean, error)) = (albedo(metal(alpha), 0.6), seen(axis));
+        assert!((mean - exact).abs() < 4.0 * error + 1e-3, "{axis}: {mean} ± {error}, by quadrature {exact}");
+    }
+}
+
+/// Lit from one side, a turned end shows the streak of a record: bright where its grooves run across the plane of light.
+#[test]
+fn turned_ends_shine_in_a_streak_through_their_axis() {
+    let lay = Some(Lay { grooves: Grooves::Circular, along: 0.1 });
+    let disc = |lay| {
+        let scene = Scene {
+            bodies: vec![body(
+                cylinder(20.0, 2.0, 64),
+                [0.0; 3],
+                Finish { lay, ..finish(MaterialKind::Metal, 1.0, 0.5) },
+            )],
+            ground: None,
+            lamps: vec![lamp(
+                Emitter::Panel { frame: facing([60.0, 0.0, 100.0], false), width: 20.0, height: 20.0 },
+                0,
+            )],
+            groups: 1,
+        };
+        let camera = Camera::look_at([0.0, 0.0, 300.0], [0.0, 0.0, 2.0], 400.0, [48, 48]);
+        let image = render(&scene, &camera, &Settings::exact(64, 2));
+        // Half way out on the side of the lamp, and a quarter turn further.
+        [[34, 24], [24, 34]].map(|[x, y]: [usize; 2]| f64::from(image.groups[0][y * 48 + x]))
+    };
+    let ([side, turned], [plain, plain_turned]) = (disc(lay), disc(None));
+    assert!(side > 3.0 * turned && side > plain, "{side} {turned} {plain}");
+    assert!(plain < 2.0 * plain_turned, "{plain} {plain_turned}");
+}
+
+/// The spread over seeds is what the spread within halves of the samples says, and falls faster than by independent draws.
+#[test]
+fn noise_is_known_from_replicates_and_falls_faster_than_by_chance() {
+    let (scene, camera) = (small_scene(), small_camera());
+    let noise = |samples: u32, seeds: std::ops::Range<u64>| {
+        let runs: Vec<Vec<f32>> = seeds
+            .map(|seed| {
+                render(&scene, &camera, &Settings { seed, ..Settings::exact(samples, 3) }).groups.swap_remove(0)
+            })
+            .collect();
+        let n = runs.len() as f64;
+        let variance = |i: usize| {
+            let mean = runs.iter().map(|r| f64::from(r[i])).sum::<f64>() / n;
+            runs.iter().map(|r| (f64::from(r[i]) - mean).powi(2)).sum::<f64>() / (n - 1.0)
+        };
+        (0..runs[0].len()).map(variance).sum::<f64>() / runs[0].len() as f64
+    };
+    let (few, many, others) = (noise(4, 0..8), noise(16, 0..8), noise(16, 100..108));
+    assert!((0.8..1.25).contains(&(many / others)), "{many} {others}");
+    // Independent draws would leave a quarter.
+    assert!(many < 0.22 * few, "{few} {many}");
 }
 
 #[test]

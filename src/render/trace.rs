@@ -291,7 +291,10 @@ struct Vertex {
 
 impl Vertex {
     fn new(spot: Spot, walk: &Walk, depth: u32) -> Vertex {
-        let frame = Frame::around(spot.shading);
+        let frame = match spot.grooves {
+            Some(along) => Frame::along(spot.shading, along),
+            None => Frame::around(spot.shading),
+        };
         let wo = frame.to_local(-walk.ray.direction);
         Vertex { origin: spot.lifted(), spot, frame, wo, throughput: walk.throughput, depth }
     }
@@ -300,7 +303,7 @@ impl Vertex {
 /// The same surface with its GGX alpha at least `least`: what is seen in a mirror is seen less sharply.
 fn roughened(bsdf: Bsdf, least: f32) -> Bsdf {
     match bsdf {
-        Bsdf::Metal { alpha, n, k, scale } => Bsdf::Metal { alpha: alpha.max(least), n, k, scale },
+        Bsdf::Metal { alpha, n, k, scale } => Bsdf::Metal { alpha: alpha.map(|a| a.max(least)), n, k, scale },
         Bsdf::Plastic { albedo, alpha } => Bsdf::Plastic { albedo, alpha: alpha.max(least) },
         Bsdf::Matt { .. } => bsdf,
     }

@@ -27,6 +27,18 @@ impl Frame {
         }
     }
 
+    /// The frame round a unit normal whose x runs along `x` as far as the surface lets it; any where `x` has no direction in the
+    /// surface.
+    pub fn along(z: Vec3, x: Vec3) -> Frame {
+        let x = x - z * z.dot(&x);
+        let length = x.norm();
+        if length.is_nan() || length <= 1e-6 {
+            return Frame::around(z);
+        }
+        let x = x / length;
+        Frame { x, y: z.cross(&x), z }
+    }
+
     pub fn to_local(self, v: Vec3) -> Vec3 {
         Vec3::new(self.x.dot(&v), self.y.dot(&v), self.z.dot(&v))
     }
@@ -74,12 +86,15 @@ mod tests {
 
     #[test]
     fn frames_are_orthonormal_also_at_the_poles() {
-        for z in [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.6, 0.0, -0.8], [0.48, 0.6, 0.64]] {
-            let frame = Frame::around(Vec3::from(z));
+        let normals = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.6, 0.0, -0.8], [0.48, 0.6, 0.64]].map(Vec3::from);
+        let along = Vec3::new(3.0, -7.0, 2.0);
+        let frames = normals.map(|z| [Frame::around(z), Frame::along(z, along), Frame::along(z, z * 4.0)]);
+        for frame in frames.into_iter().flatten() {
             assert!(frame.x.dot(&frame.y).abs() < 1e-6 && frame.x.dot(&frame.z).abs() < 1e-6);
             assert!((frame.x.cross(&frame.y) - frame.z).norm() < 1e-6);
             let v = Vec3::new(0.3, -0.2, 0.9);
             assert!((frame.to_world(frame.to_local(v)) - v).norm() < 1e-6);
         }
+        assert!((Frame::along(normals[3], along).to_local(along).y).abs() < 1e-5);
     }
 }

@@ -9,8 +9,8 @@ use super::edge_break::{Beyond, rounded, sides};
 use super::lamp::{FlatLamp, LampHit, Sky};
 use super::mottle::blotches;
 use super::vector::Vec3;
-use crate::design::model::MaterialKind;
-use crate::scene::{Body, Finish, Ground, Scene};
+use crate::design::model::{Grooves, Lay, MaterialKind};
+use crate::scene::{Axis, Body, Finish, Ground, Scene};
 use nalgebra::Matrix3;
 
 /// Rays start this far (mm) off the surface along its geometric normal, ...
@@ -37,6 +37,8 @@ struct Triangle {
     /// Sides on a broken edge.
     sides: [Option<Beyond>; 3],
     skin: u32,
+    /// Face of the body.
+    face: u32,
 }
 
 struct Plane {
@@ -64,6 +66,8 @@ pub(super) struct Spot {
     pub geometric: Vec3,
     /// Normal of the surface that the triangle stands for; the ray comes from its upper side.
     pub shading: Vec3,
+    /// Along the grooves of machining, not of unit length nor quite in the surface: x of the frame that the BSDF is meant in.
+    pub grooves: Option<Vec3>,
     pub bsdf: Bsdf,
 }
 
@@ -142,8 +146,10 @@ impl World {
         let width = self.skins[triangle.skin as usize].edge_break;
         let smooth = rounded(smooth, [a, b, c], weights, &triangle.sides, width);
         let shading = facing(smooth, geometric, ray.direction);
-        let bsdf = self.skins[triangle.skin as usize].at(position);
-        Encounter::Surface(Spot { position, geometric, shading, bsdf })
+        let skin = &self.skins[triangle.skin as usize];
+        let grooves = skin.grooves(position, triangle.face).filter(|along| lies_in(along, shading));
+        let bsdf = skin.at(position, grooves.is_some());
+        Encounter::Surface(Spot { position, geometric, shading, grooves, bsdf })
     }
 }
 
@@ -158,14 +164,22 @@ fn facing(smooth: Vec3, geometric: Vec3, direction: Vec3) -> Vec3 {
     if below <= 0.0 { smooth } else { (smooth - direction * below).normalize() }
 }
 
+/// Whether grooves may run along a direction: not where it leaves the surface, nor at the centre of circles.
+fn lies_in(along: &Vec3, normal: Vec3) -> bool {
+    /// Steeper than this (cosine from the normal), no tool leaves grooves.
+    const STEEPEST: f32 = 0.95;
+    along.norm() > 1e-6 && along.dot(&normal).abs() < STEEPEST * along.norm()
+}
+
 fn add_body(body: &Body, skin: u32, corners: &mut Vec<Corners>, triangles: &mut Vec<Triangle>) {
     let positions: Vec<[f32; 3]> =
         body.mesh.positions.iter().map(|p| (body.pose * p).coords.cast::<f32>().into()).collect();
     let rotation = body.pose.rotation.to_rotation_matrix();
     let sides = sides(&body.mesh, rotation.matrix());
-    for ((indices, normals), sides) in body.mesh.triangles.iter().zip(&body.mesh.normals).zip(sides) {
+    for (i, (indices, normals)) in body.mesh.triangles.iter().zip(&body.mesh.normals).enumerate() {
         corners.push(indices.map(|i| positions[i as usize]));
-        triangles.push(Triangle { normals: normals.map(|n| (rotation * n).cast()), sides, skin });
+        let face = body.mesh.faces.get(i).copied().unwrap_or_default();
+        triangles.push(Triangle { normals: normals.map(|n| (rotation * n).cast()), sides: sides[i], skin, face });
     }
 }
 
@@ -179,7 +193,7 @@ fn middle(corners: &[Corners]) -> Option<Vec3> {
 impl Plane {
     fn new(ground: &Ground) -> Plane {
         let origin = ground.origin.coords.cast();
-        Plane { z: ground.z as f32, skin: Skin::new(&ground.finish, Matrix3::identity(), origin) }
+        Plane { z: ground.z as f32, skin: Skin::new(&ground.finish, Matrix3::identity(), origin, &[]) }
     }
 
     /// Where a ray meets the plane from above.
@@ -191,7 +205,10 @@ impl Plane {
     fn spot(&self, ray: &Ray, t: f32) -> Spot {
         let mut position = ray.origin + ray.direction * t;
         position.z = self.z;
-        Spot { position, geometric: Vec3::z(), shading: Vec3::z(), bsdf: self.skin.at(position) }
+        let up = Vec3::z();
+        let grooves = self.skin.grooves(position, 0).filter(|along| lies_in(along, up));
+        let bsdf = self.skin.at(position, grooves.is_some());
+        Spot { position, geometric: up, shading: up, grooves, bsdf }
     }
 }
 
@@ -208,15 +225,43 @@ struct Skin {
     to_blotches: Matrix3<f32>,
     origin: Vec3,
     seed: u32,
+    lines: Lines,
+    /// Roughness along the lines, as a share of that across them.
+    along: f32,
+}
+
+/// How grooves run, in the station's frame.
+enum Lines {
+    None,
+    Straight(Vec3),
+    /// About the axis of each face (point, direction); about the last beyond them.
+    Circles(Vec<(Vec3, Vec3)>),
+}
+
+impl Lines {
+    fn new(lay: Option<&Lay>, to_part: &Matrix3<f32>, origin: Vec3, axes: &[Axis]) -> Lines {
+        let to_station = to_part.transpose();
+        let placed = |axis: &Axis| {
+            (to_station * axis.point.coords.cast::<f32>() + origin, to_station * axis.direction.cast::<f32>())
+        };
+        match lay.map(|lay| lay.grooves) {
+            None => Lines::None,
+            Some(Grooves::Straight(axis)) => Lines::Straight(to_station.column(axis.min(2)).into_owned()),
+            Some(Grooves::Circular) if axes.is_empty() => {
+                Lines::Circles(vec![(origin, to_station.column(2).into_owned())])
+            }
+            Some(Grooves::Circular) => Lines::Circles(axes.iter().map(placed).collect()),
+        }
+    }
 }
 
 impl Skin {
     fn of_body(body: &Body) -> Skin {
         let to_part = body.pose.rotation.to_rotation_matrix().into_inner().transpose().cast();
-        Skin::new(&body.finish, to_part, body.pose.translation.vector.cast())
+        Skin::new(&body.finish, to_part, body.pose.translation.vector.cast(), &body.axes)
     }
 
-    fn new(finish: &Finish, to_part: Matrix3<f32>, origin: Vec3) -> Skin {
+    fn new(finish: &Finish, to_part: Matrix3<f32>, origin: Vec3, axes: &[Axis]) -> Skin {
         // A size of 0 would be noise without end: blotches smaller than a micrometre do not show.
         let scale = Vec3::from(finish.mottle_size.map(|s| 1.0 / s.abs().max(1e-3) as f32));
         Skin {
@@ -230,11 +275,25 @@ impl Skin {
             to_blotches: Matrix3::from_diagonal(&scale) * to_part,
             origin,
             seed: (finish.mottle_seed ^ finish.mottle_seed >> 32) as u32,
+            lines: Lines::new(finish.lay.as_ref(), &to_part, origin, axes),
+            along: finish.lay.map_or(1.0, |lay| lay.along as f32),
         }
     }
 
-    /// The surface at a point of the station frame.
-    fn at(&self, position: Vec3) -> Bsdf {
+    /// The direction of the grooves at a point of a face; zero at the centre of circles.
+    fn grooves(&self, position: Vec3, face: u32) -> Option<Vec3> {
+        match &self.lines {
+            Lines::None => None,
+            Lines::Straight(along) => Some(*along),
+            Lines::Circles(axes) => {
+                let (point, axis) = axes.get(face as usize).or(axes.last())?;
+                Some(axis.cross(&(position - point)))
+            }
+        }
+    }
+
+    /// The surface at a point of the station frame, where it is grooved along x of its own frame or not.
+    fn at(&self, position: Vec3, grooved: bool) -> Bsdf {
         let [light, rough] = if self.mottle > 0.0 {
             blotches(self.to_blotches * (position - self.origin), self.seed).map(|b| 1.0 + self.mottle * b)
         } else {
@@ -243,7 +302,10 @@ impl Skin {
         let reflectance = (self.reflectance * light).max(0.0);
         let alpha = (self.roughness * rough).clamp(0.0, 1.0);
         match self.kind {
-            MaterialKind::Metal => Bsdf::Metal { alpha, n: self.n, k: self.k, scale: reflectance },
+            MaterialKind::Metal => {
+                let alpha = if grooved { [alpha * self.along, alpha] } else { [alpha; 2] };
+                Bsdf::Metal { alpha, n: self.n, k: self.k, scale: reflectance }
+            }
             MaterialKind::Plastic => Bsdf::Plastic { albedo: reflectance.min(1.0), alpha: self.roughness },
             MaterialKind::Matt => Bsdf::Matt { albedo: reflectance.min(1.0) },
         }

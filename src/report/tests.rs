@@ -45,6 +45,7 @@ fn steel() -> Material {
         edge_break: exactly(0.1),
         mottle: 0.0,
         mottle_size: [1.0; 3],
+        lay: None,
         span: Span::default(),
     }
 }

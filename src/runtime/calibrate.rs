@@ -15,6 +15,7 @@ use super::photo::Photo;
 use super::pose::{Installation, Pose};
 use super::row::Row;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::fmt;
 
 /// Weight of the spec's lamp powers against the photo, share of the photo's own evidence.
@@ -215,6 +216,7 @@ fn proves(node: &Node, report: &NodeReport) -> bool {
 
 /// The calibration without the question whether the photos show a fault.
 pub fn fit(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationError> {
+    let photos: Vec<Cow<Photo>> = photos.iter().map(|p| p.flattened(model.station.vignetting)).collect();
     let first = photos.first().ok_or(CalibrationError::NoPhoto)?;
     let prepared = Prepared::new(model).ok_or(CalibrationError::Unusable)?;
     let noise = noise_of(&first.light).max(ROUNDING);
@@ -233,7 +235,7 @@ pub fn fit(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationEr
         return Err(CalibrationError::PoorFit { correlation, least });
     }
     let light = light(model, &weights);
-    let reference = |(photo, pose): (&Photo, &Pose)| {
+    let reference = |(photo, pose): (&Cow<Photo>, &Pose)| {
         let pyramid = prepared.pyramid(&photo.light);
         let window =
             |node: &NodeImages| node.reference(&light, noise, pyramid.at(node.window.frame.factor), &camera, pose);

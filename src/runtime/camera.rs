@@ -1,4 +1,4 @@
-//! The camera: a pinhole with radial distortion, the same struct for rendering, training and judging.
+//! The camera: a pinhole with radial distortion and vignetting, the same struct for rendering, training and judging.
 //!
 //! World frame in mm, image frame in px with the origin at the outer corner of the top left pixel, so the centre of
 //! that pixel is (0.5, 0.5). Camera frame: x right, y down, z along the view.
@@ -21,6 +21,9 @@ pub struct Camera {
     pub centre: [f64; 2],
     /// Radial distortion: an undistorted point at r is seen at r (1 + k1 r²), r in units of half the image width.
     pub k1: f64,
+    /// The next term: k2 r⁴ is added to k1 r². Left out of files where it is 0.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub k2: f64,
     /// Image width and height in px.
     pub size: [u32; 2],
 }
@@ -33,7 +36,7 @@ impl Camera {
         let right = normalise(cross(forward, up));
         let down = cross(forward, right);
         let centre = size.map(|s| f64::from(s) / 2.0);
-        Camera { position, axes: [right, down, forward], focal, centre, k1: 0.0, size }
+        Camera { position, axes: [right, down, forward], focal, centre, k1: 0.0, k2: 0.0, size }
     }
 
     /// Pixel where a world point is seen; `None` behind the camera.
@@ -46,7 +49,10 @@ impl Camera {
         let scale = self.focal / z;
         let [u, v] = [dot(self.axes[0], d) * scale, dot(self.axes[1], d) * scale];
         let half = self.centre[0];
-        let stretch = 1.0 + self.k1 * (u * u + v * v) / (half * half);
+        let mut stretch = 1.0 + self.k1 * (u * u + v * v) / (half * half);
+        if self.k2 != 0.0 {
+            stretch += self.k2 * ((u * u + v * v) / (half * half)).powi(2);
+        }
         Some([u * stretch + half, v * stretch + self.centre[1]])
     }
 
@@ -55,10 +61,10 @@ impl Camera {
         let half = self.centre[0];
         let seen = [pixel[0] - half, pixel[1] - self.centre[1]];
         let mut undistorted = seen;
-        // Fixed point of r (1 + k1 r²) = seen: contracts by a factor of about 2 k1 r² per round.
-        for _ in 0..20 {
+        // Fixed point of r (1 + k1 r² + k2 r⁴) = seen: contracts by a factor of about 2 k1 r² + 4 k2 r⁴ per round.
+        for _ in 0..if self.k2 == 0.0 { 20 } else { 60 } {
             let r2 = (undistorted[0].powi(2) + undistorted[1].powi(2)) / (half * half);
-            let stretch = 1.0 + self.k1 * r2;
+            let stretch = if self.k2 == 0.0 { 1.0 + self.k1 * r2 } else { 1.0 + (self.k1 + self.k2 * r2) * r2 };
             undistorted = [seen[0] / stretch, seen[1] / stretch];
         }
         let [u, v] = [undistorted[0] / self.focal, undistorted[1] / self.focal];
@@ -79,6 +85,18 @@ impl Camera {
         let (focal, centre) = (self.focal / by, self.centre.map(|c| c / by));
         Camera { focal, centre, size: self.size.map(|s| s / factor), ..*self }
     }
+}
+
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
+}
+
+/// Share of light that a lens lets through to a place (px) of an image of this size: 1 in the middle, 1 - `vignetting` in the
+/// corners, falling with the square of the radius.
+pub fn let_through(vignetting: f64, size: [u32; 2], place: [f64; 2]) -> f64 {
+    let half = size.map(|s| f64::from(s) / 2.0);
+    let [x, y] = [place[0] - half[0], place[1] - half[1]];
+    1.0 - vignetting * (x * x + y * y) / (half[0] * half[0] + half[1] * half[1])
 }
 
 pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
@@ -110,6 +128,21 @@ mod tests {
             let pixel = camera.project(p).unwrap();
             let back = camera.on_plane(pixel, p[2]).unwrap();
             assert!(sub(back, p).iter().all(|e| e.abs() < 1e-6), "{p:?} {back:?}");
+        }
+    }
+
+    #[test]
+    fn the_second_term_bends_and_is_undone() {
+        let plain = Camera::look_at([0.0, -155.0, 303.0], [0.0, 0.0, 12.0], 2162.0, [640, 480]);
+        for (k1, k2) in [(0.0, 0.04), (-0.05, 0.02), (0.03, -0.05)] {
+            let camera = Camera { k1, k2, ..plain };
+            let p = [-48.0, 33.0, 4.0];
+            let (bent, straight) = (camera.project(p).unwrap(), plain.project(p).unwrap());
+            let r2 = ((straight[0] - 320.0).powi(2) + (straight[1] - 240.0).powi(2)) / 320f64.powi(2);
+            let grown = (bent[0] - 320.0) / (straight[0] - 320.0);
+            assert!((grown - (1.0 + k1 * r2 + k2 * r2 * r2)).abs() < 1e-12 && r2 > 0.8, "{grown} {r2}");
+            let back = camera.on_plane(bent, p[2]).unwrap();
+            assert!(sub(back, p).iter().all(|e| e.abs() < 1e-6), "{back:?}");
         }
     }
 

@@ -133,6 +133,7 @@ impl<'a> Inspector<'a> {
 
     /// Judges one photo.
     pub fn inspect(&self, photo: &Photo) -> Verdict {
+        let photo = &*photo.flattened(self.model.station.vignetting);
         let fields = self.search.fields(&photo.light, self.calibration.noise);
         let located = self.search.locate(&fields, &self.camera, &widened(&self.model));
         let least = self.least_score();

@@ -45,6 +45,10 @@ pub struct Station {
     /// Where the spec says the camera is.
     pub camera: Camera,
     pub tone: Tone,
+    /// Share of light that the lens loses in the corners of the image, falling with the square of the radius. Left out of files
+    /// where it is 0.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub vignetting: f64,
     pub install: Install,
     /// Ranges in which the assembly may stand: x, y, z (mm) and turn about z (rad).
     pub standing: [[f64; 2]; 4],
@@ -53,6 +57,10 @@ pub struct Station {
     pub lamps: Vec<Lamp>,
     /// A calibration photo whose gradients correlate less with their re-synthesis does not show this assembly.
     pub least_correlation: f64,
+}
+
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 /// How far the camera may be from where the spec says: half-widths.
@@ -278,7 +286,8 @@ impl Model {
 impl Station {
     fn is_finite(&self) -> bool {
         let camera = &self.camera;
-        let numbers = [camera.focal, camera.k1, self.noise, self.install.position_mm, self.install.angle_rad];
+        let numbers =
+            [camera.focal, camera.k1, camera.k2, self.noise, self.install.position_mm, self.install.angle_rad];
         let lamps = self.lamps.iter().all(|l| l.power.is_finite() && l.drift.is_finite() && l.power >= 0.0);
         numbers.iter().chain(&camera.position).chain(camera.axes.as_flattened()).all(|v| v.is_finite())
             && self.standing.as_flattened().iter().all(|v| v.is_finite() && v.abs() < 1e6)
@@ -290,6 +299,7 @@ impl Station {
             && self.least_correlation.is_finite()
             && self.install.k1.iter().all(|v| v.is_finite())
             && camera.focal > 0.0
+            && (0.0..=0.9).contains(&self.vignetting)
             && lamps
     }
 }

@@ -2,9 +2,12 @@
 //!
 //! In: bytes of a PNG, JPEG, BMP or TIFF file, or pixels in memory. Out: [`Photo`], linear in light, 1.0 at full scale. Never touches the file system.
 
+use super::camera::let_through;
 use super::grid::Grid;
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
+use image::metadata::Orientation;
+use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::fmt;
 use std::io::{self, Cursor};
 
@@ -53,24 +56,37 @@ impl std::error::Error for PhotoError {}
 
 impl Photo {
     /// Decodes the bytes of an image file of 8 or 16 bits; colour becomes luminance (ITU-R BT.709) after linearisation, and
-    /// alpha is passed over. The size is compared before anything is allocated for the pixels.
+    /// alpha is passed over. A file that says how the camera was held (EXIF) is turned upright, as every viewer shows it. The size
+    /// is compared before anything is allocated for the pixels.
     pub fn decode(bytes: &[u8], tone: Tone, size: [u32; 2]) -> Result<Photo, PhotoError> {
         let unreadable = |e: ImageError| PhotoError::Unreadable(plain(&e));
         let mut limits = limits();
         let mut reader = ImageReader::new(Cursor::new(bytes));
         reader.limits(limits.clone());
         let reader = reader.with_guessed_format().map_err(|e| PhotoError::Unreadable(e.to_string()))?;
-        if reader.format() == Some(ImageFormat::Jpeg) && !is_whole_jpeg(bytes) {
-            return Err(PhotoError::Unreadable(CUT_SHORT.into()));
+        if reader.format() == Some(ImageFormat::Jpeg) {
+            match jpeg(bytes) {
+                None => return Err(PhotoError::Unreadable(CUT_SHORT.into())),
+                Some(INKS) => return Err(PhotoError::Unreadable(PRINT.into())),
+                Some(_) => {}
+            }
         }
         let mut decoder = reader.into_decoder().map_err(unreadable)?;
-        let is = decoder.dimensions().into();
+        if matches!(decoder.original_color_type(), ExtendedColorType::Cmyk8 | ExtendedColorType::Cmyk16) {
+            return Err(PhotoError::Unreadable(PRINT.into()));
+        }
+        let held = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+        let mut is: [u32; 2] = decoder.dimensions().into();
+        if lies_on_its_side(held) {
+            is.reverse();
+        }
         if is != size {
             return Err(PhotoError::WrongSize(is, size));
         }
         limits.reserve(decoder.total_bytes()).map_err(unreadable)?;
         decoder.set_limits(limits).map_err(unreadable)?;
-        let decoded = DynamicImage::from_decoder(decoder).map_err(unreadable)?;
+        let mut decoded = DynamicImage::from_decoder(decoder).map_err(unreadable)?;
+        decoded.apply_orientation(held);
         let light = light(&decoded, tone).ok_or_else(|| {
             PhotoError::Unreadable("its pixels are floating-point numbers: 8 or 16 bits are expected".into())
         })?;
@@ -107,6 +123,18 @@ impl Photo {
             }
         }
         Ok(Photo { light: Grid::new(width, height, values) })
+    }
+
+    /// The photo as a lens without vignetting would have taken it. What the sensor clipped stays at full scale or above.
+    pub fn flattened(&self, vignetting: f64) -> Cow<'_, Photo> {
+        if vignetting == 0.0 {
+            return Cow::Borrowed(self);
+        }
+        let (width, size) = (self.light.width, [self.light.width as u32, self.light.height as u32]);
+        let place = |i: usize| [(i % width) as f64 + 0.5, (i / width) as f64 + 0.5];
+        let flat = |(i, &v): (usize, &f32)| v / let_through(vignetting, size, place(i)) as f32;
+        let values = self.light.values.iter().enumerate().map(flat).collect();
+        Cow::Owned(Photo { light: Grid::new(width, self.light.height, values) })
     }
 
     /// A photo from linear values, row by row.
@@ -163,28 +191,41 @@ fn limits() -> Limits {
 }
 
 const CUT_SHORT: &str = "the file is cut short";
+const PRINT: &str = "it is separated for print (CMYK) and holds amounts of ink, not light: grey or RGB is expected";
+/// Components of a JPEG file that is separated for print.
+const INKS: u8 = 4;
 
-/// Whether a JPEG file goes on to its end marker (ITU-T T.81, annex B). The decoder paints what is missing grey, and the inspector
-/// would judge that.
-fn is_whole_jpeg(bytes: &[u8]) -> bool {
+fn lies_on_its_side(held: Orientation) -> bool {
+    use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
+    matches!(held, Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH)
+}
+
+/// The number of components of a JPEG file, if it goes on to its end marker (ITU-T T.81, annex B). The decoder paints what is
+/// missing grey, and the inspector would judge that.
+fn jpeg(bytes: &[u8]) -> Option<u8> {
     const END: u8 = 0xd9;
-    let mut at = 0;
+    /// From the marker of a frame to the number of its components.
+    const COMPONENTS: usize = 8;
+    let (mut at, mut components) = (0, 0);
     while let Some(found) = bytes.get(at..).and_then(|rest| rest.iter().position(|&b| b == 0xff)) {
         at += found + 1;
         match bytes.get(at) {
-            Some(&END) => return true,
+            Some(&END) => return Some(components),
             // Stuffed zeros and restarts within a scan, start of image, a marker without a segment, padding.
             Some(0x00 | 0x01 | 0xd0..=0xd8) => at += 1,
             Some(0xff) => {}
             // Segments are stepped over: what they hold, a preview with an end of its own, may look like markers.
-            Some(_) => match bytes.get(at + 1..at + 3) {
-                Some(&[high, low]) => at += 1 + usize::from(u16::from_be_bytes([high, low])),
-                _ => return false,
-            },
-            None => return false,
+            Some(marker) => {
+                if matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc) {
+                    components = *bytes.get(at + COMPONENTS)?;
+                }
+                let &[high, low] = bytes.get(at + 1..at + 3)? else { return None };
+                at += 1 + usize::from(u16::from_be_bytes([high, low]));
+            }
+            None => return None,
         }
     }
-    false
+    None
 }
 
 /// What is wrong with a file, for people.
@@ -203,7 +244,7 @@ fn light(image: &DynamicImage, tone: Tone) -> Option<Vec<f32>> {
     fn grey<P: Copy + Into<u16>>(samples: &[P], step: usize, curve: Curve) -> Vec<f32> {
         samples.chunks_exact(step).map(|p| curve.at(p[0])).collect()
     }
-    fn colour<P: Copy + Into<u16>>(samples: &[P], step: usize, curve: Curve) -> Vec<f32> {
+    fn colour<P: Copy + Into<u16> + PartialEq>(samples: &[P], step: usize, curve: Curve) -> Vec<f32> {
         samples.chunks_exact(step).map(|p| curve.luminance(p[0], p[1], p[2])).collect()
     }
     Some(match image {
@@ -232,7 +273,11 @@ impl Curve {
         self.0[usize::from(value.into())]
     }
 
-    fn luminance<P: Into<u16>>(&self, red: P, green: P, blue: P) -> f32 {
+    fn luminance<P: Into<u16> + PartialEq>(&self, red: P, green: P, blue: P) -> f32 {
+        // Grey is the same light in a file of any kind, to the last bit.
+        if red == green && green == blue {
+            return self.at(red);
+        }
         0.2126 * self.at(red) + 0.7152 * self.at(green) + 0.0722 * self.at(blue)
     }
 }
@@ -253,6 +298,15 @@ mod tests {
         assert_eq!(Photo::decode(&png, Tone::Linear, [2, 2]).unwrap_err(), PhotoError::WrongSize([3, 2], [2, 2]));
         assert!(matches!(Photo::decode(&png[..40], Tone::Linear, [3, 2]), Err(PhotoError::Unreadable(_))));
         assert!(Photo::decode(&png, Tone::Linear, [3, 2]).is_ok());
+    }
+
+    #[test]
+    fn flattening_undoes_the_lens() {
+        let dimmed = |i: usize| 0.6 * let_through(0.4, [64, 48], [(i % 64) as f64 + 0.5, (i / 64) as f64 + 0.5]) as f32;
+        let photo = Photo::from_light(Grid::new(64, 48, (0..64 * 48).map(dimmed).collect()));
+        assert!(photo.light.values[0] < 0.62 * photo.light.values[24 * 64 + 32]);
+        assert!(photo.flattened(0.4).light.values.iter().all(|v| (v - 0.6).abs() < 1e-6));
+        assert!(matches!(photo.flattened(0.0), Cow::Borrowed(_)));
     }
 
     #[test]

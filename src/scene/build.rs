@@ -5,8 +5,9 @@
 //! and every patch of the room's light is a light group of its own, because images are linear in light and only the
 //! customer's photo knows the weights. Never draws anything but finishes, never touches a photo.
 
+use super::turning::axes;
 use super::{Body, Emitter, Finish, Ground, Lamp, Scene};
-use crate::design::model::{CameraSpec, LightShape, LightSpec, Material, Station};
+use crate::design::model::{CameraSpec, Grooves, Lay, LightShape, LightSpec, Material, Station};
 use crate::rng::Stream;
 use crate::runtime::camera::{Camera, Vec3, cross, dot, normalise, sub};
 use crate::solid::{Solid, TriMesh};
@@ -55,6 +56,7 @@ pub fn camera(spec: &CameraSpec, placing: Placed) -> Camera {
         focal: spec.focal.nominal / spec.pitch,
         centre: spec.image.map(|n| f64::from(n) / 2.0),
         k1: (spec.k1.low + spec.k1.high) / 2.0,
+        k2: spec.k2,
         size: spec.image,
     }
 }
@@ -100,6 +102,7 @@ pub fn finish_nominal(material: &Material) -> Finish {
         mottle: material.mottle,
         mottle_size: material.mottle_size,
         mottle_seed: 0,
+        lay: material.lay,
     }
 }
 
@@ -129,6 +132,10 @@ pub fn bodies(instance: &Instance, standing: [f64; 4]) -> Vec<Body> {
         pose: stand * instance.poses[component],
         finish: instance.finishes[component].clone(),
         component,
+        axes: match instance.finishes[component].lay {
+            Some(Lay { grooves: Grooves::Circular, .. }) => axes(solid),
+            _ => Arc::default(),
+        },
     };
     present.map(body).collect()
 }
@@ -228,6 +235,10 @@ mod tests {
             aim: [0.0, 0.0, 12.0],
             placing: CameraPlacing::Fixed { distance: 330.0, elevation: 1.08, azimuth: -FRAC_PI_2 },
             k1: Range { low: -0.05, nominal: 0.0, high: 0.0 },
+            k2: 0.0,
+            vignetting: Range::exactly(0.0),
+            full_well: f64::INFINITY,
+            depth: 8,
             install_mm: 1.5,
             install_rad: 0.007,
             blur: Range::exactly(0.5),
@@ -264,6 +275,7 @@ mod tests {
             edge_break: Range::exactly(0.0),
             mottle: 0.0,
             mottle_size: [1.0; 3],
+            lay: None,
             span: Span::default(),
         }
     }

@@ -3,10 +3,11 @@
 //! In: placed solids with sampled materials, a station. Out: [`Scene`] in the station's frame (mm). Never traces a ray.
 
 pub mod build;
+mod turning;
 
-use crate::design::model::MaterialKind;
+use crate::design::model::{Lay, MaterialKind};
 use crate::solid::TriMesh;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
 
 /// A sampled material: numbers, no ranges.
@@ -23,6 +24,14 @@ pub struct Finish {
     pub mottle_size: [f64; 3],
     /// Which pattern of blotches this piece happens to have.
     pub mottle_seed: u64,
+    pub lay: Option<Lay>,
+}
+
+/// A straight line in space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    pub point: Point3<f64>,
+    pub direction: Vector3<f64>,
 }
 
 /// One closed body.
@@ -35,6 +44,8 @@ pub struct Body {
     pub finish: Finish,
     /// Index of the component in the design.
     pub component: usize,
+    /// The axis that each face of the mesh was turned about, in the part's frame. Empty where nobody asks: z stands in.
+    pub axes: Arc<[Axis]>,
 }
 
 /// A light source. Its radiance is 1 in its own group's image; weights come afterwards, because images are linear in light.

@@ -282,6 +282,7 @@ fn station(job: &Job, lamps: Vec<Lamp>) -> model::Station {
         name: job.station.name.clone(),
         camera: job.camera,
         tone,
+        vignetting: spec.vignetting.nominal,
         install,
         standing: shots::standing(job.station),
         noise: job.station.noise,
@@ -300,7 +301,7 @@ fn held_out(
 ) -> Result<Vec<(verify::Customer, Shots)>, Vec<Diagnostic>> {
     (0..CUSTOMERS)
         .map(|index| {
-            let customer = verify::customer(model, index);
+            let customer = verify::customer(model, &job.station.camera, index);
             let camera = customer.installation.apply(&job.camera);
             // Another seed than training's: these draws must be new.
             let draws = Draws { seed: customer.seed, count: HELD_OUT_GOOD, faulty: HELD_OUT_FAULTY };

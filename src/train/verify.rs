@@ -9,9 +9,10 @@ use super::stats::{rate, rounded};
 use super::synthesise::{FaultyShot, Shots};
 use super::thresholds;
 use crate::assembly::fault::ErrorMode;
-use crate::design::model::Design;
+use crate::design::model::{CameraSpec, Design};
 use crate::rng::Stream;
 use crate::runtime::calibrate::{self, Calibration};
+use crate::runtime::camera::let_through;
 use crate::runtime::grid::Grid;
 use crate::runtime::inspect::{self, Decision, Inspector, Verdict};
 use crate::runtime::light::{range, within};
@@ -44,10 +45,16 @@ pub struct Customer {
     pub powers: Vec<f64>,
     pub noise: f64,
     pub seed: u64,
+    /// Share of light that his lens loses in the corners.
+    pub vignetting: f64,
+    /// Electrons at full scale.
+    pub full_well: f64,
+    /// The largest grey value.
+    pub deepest: f64,
 }
 
 /// Customer number `index`.
-pub fn customer(model: &Model, index: u64) -> Customer {
+pub fn customer(model: &Model, spec: &CameraSpec, index: u64) -> Customer {
     let mut stream = Stream::new(model.seed, "customer", index);
     let install = &model.station.install;
     let mut within = |half: f64| stream.between(-half, half);
@@ -60,11 +67,19 @@ pub fn customer(model: &Model, index: u64) -> Customer {
         model.station.lamps.iter().map(|l| l.power * exposure * stream.between(LAMP_POWERS[0], LAMP_POWERS[1]));
     let powers = powers.collect();
     let installation = Installation { offset, turn, focal, k1 };
-    Customer { installation, powers, noise: model.station.noise.max(0.002), seed: stream.bits() }
+    Customer {
+        installation,
+        powers,
+        noise: model.station.noise.max(0.002),
+        seed: stream.bits(),
+        vignetting: spec.vignetting.at(Stream::new(model.seed, "lens", index).uniform()),
+        full_well: spec.full_well,
+        deepest: f64::from((1_u32 << spec.depth.min(16)) - 1),
+    }
 }
 
-/// A photo: lamps drift, the sensor adds its noise, clips and rounds to 8 bits. Where the light is open the camera exposes
-/// by itself.
+/// A photo: lamps drift, the lens dims the corners, the sensor adds its noise, clips and rounds. Where the light is open the
+/// camera exposes by itself.
 pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, index: u64) -> Photo {
     let mut stream = Stream::new(customer.seed, "photo", index);
     let open = inspect::light(model, &customer.powers).is_open();
@@ -86,11 +101,18 @@ pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, inde
         let gain = stream.between(EXPOSURES[0], EXPOSURES[1]) as f32 / bright;
         light.values.iter_mut().for_each(|v| *v *= gain);
     }
-    let size = model.station.camera.size.map(|s| s as usize);
-    let mut full = light.magnified(base as usize, size);
-    for v in &mut full.values {
-        let noisy = (f64::from(*v) + customer.noise * stream.normal()).clamp(0.0, 1.0);
-        *v = ((noisy * 255.0).round() / 255.0) as f32;
+    let size = model.station.camera.size;
+    let mut full = light.magnified(base as usize, size.map(|s| s as usize));
+    let width = full.width;
+    for (i, value) in full.values.iter_mut().enumerate() {
+        let mut v = f64::from(*value).max(0.0);
+        if customer.vignetting > 0.0 {
+            v *= let_through(customer.vignetting, size, [(i % width) as f64 + 0.5, (i / width) as f64 + 0.5]);
+        }
+        // Shot and read noise (EMVA 1288).
+        let scatter = (customer.noise * customer.noise + v.min(1.0) / customer.full_well).sqrt();
+        let noisy = (v + scatter * stream.normal()).clamp(0.0, 1.0);
+        *value = ((noisy * customer.deepest).round() / customer.deepest) as f32;
     }
     Photo::from_light(full)
 }

@@ -94,7 +94,7 @@ impl ItemBuffer {
         Self::on_grid(bodies, camera, &PixelGrid::of(camera))
     }
 
-    /// The same with a grid made before by [`PixelGrid::of`] a camera of the same focal length, centre, k1 and size.
+    /// The same with a grid made before by [`PixelGrid::of`] a camera of the same focal length, centre, k1, k2 and size.
     pub fn on_grid(bodies: &[Body], camera: &Camera, grid: &PixelGrid) -> ItemBuffer {
         let mut canvas = Canvas::new(grid);
         for body in bodies {

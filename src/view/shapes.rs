@@ -55,8 +55,9 @@ pub fn body(component: usize, mesh: TriMesh, pose: Isometry3<f64>) -> Body {
         mottle: 0.0,
         mottle_size: [1.0; 3],
         mottle_seed: 0,
+        lay: None,
     };
-    Body { mesh: Arc::new(mesh), pose, finish, component }
+    Body { mesh: Arc::new(mesh), pose, finish, component, axes: Arc::default() }
 }
 
 pub fn placed(x: f64, y: f64, z: f64) -> Isometry3<f64> {

@@ -22,6 +22,7 @@ pub(crate) fn tiny() -> Model {
             name: "bench".into(),
             camera: Camera::look_at([0.0, 0.0, 100.0], [0.0; 3], 100.0, [16, 12]),
             tone: Tone::Linear,
+            vignetting: 0.0,
             install: Install { position_mm: 1.0, angle_rad: 0.01, focal_share: 0.005, k1: [0.0, 0.0] },
             standing: [[-1.0, 1.0], [-1.0, 1.0], [0.0, 0.0], [0.0, 0.0]],
             noise: 0.01,

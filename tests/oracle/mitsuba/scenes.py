@@ -1,4 +1,4 @@
-"""Reference figures for a path tracer: five small scenes, rendered by Mitsuba 3 with many samples.
+"""Reference figures for a path tracer: seven small scenes, rendered by Mitsuba 3 with many samples.
 
 usage: scenes.py [SCENE ...]     writes scenes.json, and adds to figures.json
 Everything is in mm, z up, radiance linear. See the text in scenes.json ("conventions") for what is meant by each number.
@@ -16,6 +16,8 @@ CONVENTIONS = dict(
     light="quad/annulus: diffuse emitter of constant radiance, one-sided: emits to the side its normal points to; absorbs all that meets it from either side. quad: the normal points from `at` to `aim`, the sides of length `width` are horizontal. environment: constant radiance from all directions",
     diffuse="Lambert, radiance albedo/pi * irradiance, both sides of a quad irrelevant: only fronts are seen",
     conductor="GGX (Trowbridge-Reitz), isotropic, alpha as given (not squared), Smith masking-shadowing in the separable form G1(i) G1(o), unpolarised Fresnel of n + i k in air, no multiple scattering between facets; reflectance factor 1",
+    grooved="a conductor with alpha `along` its grooves and `across` them; on a pin they are circles about its axis, also on its top, on a sheet they run along its own x",
+    sheet="a rectangle centred on the origin of its own frame, facing +z, before `turn` and `at`; nothing is seen of its back",
     depth="number of path segments after the camera ray's start, lamps seen directly being 1: depth 2 = direct light on what is seen (and lamps), 3 = one interreflection, ... all = without end (Russian roulette only)",
     boxes="axis-aligned before `turn` (degrees about x, then y, then z, about the origin) and `at`; stand on z = 0 of their own frame, centred in x and y",
     figures="mean over pixels of radiance, se its standard error from the scatter of independent passes; blocks: 3 rows (top to bottom) of 4 (left to right), 16 x 16 pixels each")
@@ -35,6 +37,7 @@ def lamp(at, aim, width, height):
 floor = lambda albedo: dict(kind="floor", z=0, half=20000, material=dict(kind="diffuse", albedo=albedo))
 diffuse = lambda a: dict(kind="diffuse", albedo=a)
 steel = lambda alpha: dict(kind="conductor", n=2.5, k=3.3, alpha=alpha)
+grooved = lambda along, across: dict(kind="grooved", n=2.5, k=3.3, along=along, across=across)
 ring_cam = camera([0, 0, 8], 300, 70, -90, 180)
 SCENES = dict(
     a=dict(title="diffuse sphere on a diffuse plane under a rectangular lamp", camera=camera([0, 0, 12], 300, 50, -90, 200),
@@ -53,10 +56,19 @@ SCENES = dict(
     e=dict(title="ring lamp round the lens over a diffuse and a steel step", camera=ring_cam,
            objects=[floor(.1), dict(kind="box", size=[34, 40, 6], at=[-17, 0, 0], turn=[0, 0, 0], material=diffuse(.5)),
                     dict(kind="box", size=[34, 40, 14], at=[17, 0, 0], turn=[0, 0, 0], material=steel(.25))],
-           lights=[dict(kind="annulus", center=ring_cam["at"], normal=(-np.array(ring_cam["R"])[:, 2]).tolist(), inner=45, outer=75, segments=256, radiance=10)]))
+           lights=[dict(kind="annulus", center=ring_cam["at"], normal=(-np.array(ring_cam["R"])[:, 2]).tolist(), inner=45, outer=75, segments=256, radiance=10)]),
+    f=dict(title="turned steel pin under two rectangular lamps, nothing else", camera=camera([0, 0, 14], 300, 45, -90, 300),
+           objects=[dict(kind="pin", at=[0, 0, 0], d=40, h=24, material=grooved(.08, .22))],
+           lights=[dict(lamp([-40, 210, 220], [0, 0, 20], 160, 120), radiance=4), dict(lamp([90, -260, 120], [0, 0, 10], 140, 160), radiance=6)]),
+    g=dict(title="brushed steel sheet under a rectangular lamp, nothing else", camera=camera([0, 0, 0], 300, 60, -90, 200),
+           objects=[dict(kind="sheet", size=[60, 44], at=[0, 0, 0], turn=[-12, 8, 30], material=grooved(.06, .25))],
+           lights=[dict(lamp([-30, 150, 230], [0, 0, 0], 120, 90), radiance=4)]))
 
 
-def bsdf(m):
+def bsdf(m, along="u"):
+    if m["kind"] == "grooved":
+        across = "v" if along == "u" else "u"
+        return mi.load_dict({"type": "roughconductor", "eta": m["n"], "k": m["k"], f"alpha_{along}": m["along"], f"alpha_{across}": m["across"], "distribution": "ggx"})
     if m["kind"] == "diffuse":
         return mi.load_dict(dict(type="diffuse", reflectance=dict(type="uniform", value=m["albedo"])))
     return mi.load_dict(dict(type="roughconductor", eta=m["n"], k=m["k"], alpha=m["alpha"], distribution="ggx"))
@@ -94,6 +106,15 @@ def build(s):
             triangles[i] = [V[list(t)].tolist() for a, b, c, d in Q for t in ((a, b, c), (a, c, d))]
         if o["kind"] == "sphere":
             out[f"o{i}"] = mi.load_dict(dict(type="sphere", center=o["center"], radius=o["d"] / 2, bsdf=bsdf(o["material"])))
+        elif o["kind"] == "pin":
+            # Mitsuba's u runs round a cylinder, and outwards on a disk.
+            T, at, r, h = mi.ScalarTransform4f(), np.array(o["at"], float), o["d"] / 2, o["h"]
+            out[f"o{i}"] = mi.load_dict(dict(type="cylinder", p0=at.tolist(), p1=(at + [0, 0, h]).tolist(), radius=r, bsdf=bsdf(o["material"])))
+            out[f"o{i}top"] = mi.load_dict(dict(type="disk", to_world=T.translate((at + [0, 0, h]).tolist()).scale(r), bsdf=bsdf(o["material"], "v")))
+        elif o["kind"] == "sheet":
+            T = mi.ScalarTransform4f()
+            T = T.translate(o["at"]).rotate([0, 0, 1], o["turn"][2]).rotate([0, 1, 0], o["turn"][1]).rotate([1, 0, 0], o["turn"][0])
+            out[f"o{i}"] = mi.load_dict(dict(type="rectangle", to_world=T.scale([o["size"][0] / 2, o["size"][1] / 2, 1]), bsdf=bsdf(o["material"])))
         else:
             V = np.array(triangles[i]).reshape(-1, 3)
             out[f"o{i}"] = mesh(V, np.arange(len(V)).reshape(-1, 3), o["material"])
