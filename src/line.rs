@@ -10,7 +10,7 @@ use crate::assembly::piece::Workshop;
 use crate::assembly::place::place;
 use crate::cache::Cache;
 use crate::design::Loaded;
-use crate::design::model::{Design, Feature, Op, Part, Station};
+use crate::design::model::{Design, Extent, Feature, Op, Part, Shape, Station};
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Sources};
 use crate::runtime::camera::Camera;
@@ -344,17 +344,13 @@ pub(crate) fn idle_cuts(design: &Design, shapes: &[[Arc<Solid>; 3]]) -> Vec<Diag
     for (part, [solid, ..]) in design.parts.iter().zip(shapes).filter(|(part, _)| seen.insert(&part.name)) {
         let shown: BTreeSet<&str> = solid.faces.iter().filter_map(|f| f.name.split('.').next()).collect();
         for (i, feature) in part.features.iter().enumerate().filter(|(_, f)| f.op == Op::Cut) {
-            let name = |copy: usize| match feature.patterned {
-                true => format!("{}[{}]", feature.name, copy + 1),
-                false => feature.name.clone(),
-            };
             let mut idle = |copy: &usize| {
-                let suspect = !shown.contains(name(*copy).as_str()) && trials < TRIALS;
+                let suspect = !shown.contains(copy_name(feature, *copy).as_str()) && trials < TRIALS;
                 trials += usize::from(suspect);
                 suspect && is_idle(part, i, *copy, &nominal, solid.volume)
             };
-            let names: Vec<String> = (0..feature.copies.len()).filter(|copy| idle(copy)).map(name).collect();
-            found.extend(takes_nothing(part, feature, &names));
+            let copies: Vec<usize> = (0..feature.copies.len()).filter(|copy| idle(copy)).collect();
+            found.extend(takes_nothing(part, feature, &copies, &nominal, solid));
         }
     }
     found
@@ -373,14 +369,56 @@ fn is_idle(part: &Part, feature: usize, copy: usize, nominal: &[f64], volume: f6
     solid.is_ok_and(|solid| (solid.volume - volume).abs() <= NOTHING * volume)
 }
 
-fn takes_nothing(part: &Part, feature: &Feature, copies: &[String]) -> Option<Diagnostic> {
-    let (first, others) = copies.split_first()?;
+fn copy_name(feature: &Feature, copy: usize) -> String {
+    if feature.patterned { format!("{}[{}]", feature.name, copy + 1) } else { feature.name.clone() }
+}
+
+fn takes_nothing(
+    part: &Part,
+    feature: &Feature,
+    copies: &[usize],
+    nominal: &[f64],
+    solid: &Solid,
+) -> Option<Diagnostic> {
+    let (&copy, others) = copies.split_first()?;
+    let first = copy_name(feature, copy);
     let message = match others.len() {
         0 => format!("`{first}` takes nothing from `{}`", part.name),
         n => format!("`{first}` and {n} more of `{}` take nothing from `{}`", feature.name, part.name),
     };
-    let warning = Diagnostic::warning("W0402", feature.span, message).label("meets no material at nominal");
-    Some(warning.help("check where it stands, or remove it"))
+    let off = off_by(part, feature, copy, nominal, solid).unwrap_or_default();
+    let warning = Diagnostic::warning("W0402", feature.span, message);
+    Some(warning.label(format!("meets no material at nominal{off}")).help("check where it stands, or remove it"))
+}
+
+/// `: it stands 3.00 mm from `slab.top``, of a cut that is a body by itself.
+fn off_by(part: &Part, feature: &Feature, copy: usize, nominal: &[f64], solid: &Solid) -> Option<String> {
+    /// Of what is nearer it is said that it touches (mm).
+    const TOUCHING: f64 = 0.005;
+    fn is_endless(shape: &Shape) -> bool {
+        match shape {
+            Shape::Box { z: h, .. } | Shape::Cylinder { h, .. } | Shape::Cone { h, .. } | Shape::Prism { h, .. } => {
+                matches!(h, Extent::Through)
+            }
+            Shape::Group { features } => {
+                features.iter().flat_map(|feature| &feature.copies).any(|copy| is_endless(&copy.shape))
+            }
+            Shape::Sphere { .. } | Shape::Torus { .. } | Shape::Revolve { .. } => false,
+        }
+    }
+    let copy = feature.copies[copy].clone();
+    if is_endless(&copy.shape) {
+        return None;
+    }
+    let alone = Feature { op: Op::Add, patterned: false, copies: vec![copy], ..feature.clone() };
+    let alone = Part { features: vec![alone], ..part.clone() };
+    let tool = crate::solid::evaluate(&alone, nominal, &Quality::default()).ok()?;
+    let (distance, face) = crate::assembly::apart(&tool, solid)?;
+    let near = face.unwrap_or(&part.name);
+    Some(match distance < TOUCHING {
+        true => format!(": it only touches `{near}`"),
+        false => format!(": it stands {distance:.2} mm from `{near}`"),
+    })
 }
 
 /// E0403: which face comes or goes within tolerance.

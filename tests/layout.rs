@@ -29,6 +29,8 @@ fn name() -> impl Strategy<Value = String> {
         "_x",
         "slab_of_steel",
         "parts",
+        "part",
+        "place",
         "z9",
         "a_name_that_is_so_long_that_lines_break_because_of_it",
     ])
@@ -51,7 +53,7 @@ fn quantity() -> impl Strategy<Value = String> {
 fn sum() -> impl Strategy<Value = String> {
     let leaf = prop_oneof![quantity(), name(), name().prop_map(|n| format!("-{n}"))];
     leaf.prop_recursive(3, 12, 2, |inner| {
-        (inner.clone(), select(vec!["+", " - ", " * ", "\n/\n", " +\t"]), inner, any::<bool>())
+        (inner.clone(), select(vec!["+", " - ", " * ", "\n/\n", "\n  - ", " +\t"]), inner, any::<bool>())
             .prop_map(|(a, sign, b, group)| if group { format!("({a}{sign}{b})") } else { format!("{a} {sign} {b}") })
     })
 }
@@ -128,11 +130,8 @@ fn path() -> impl Strategy<Value = String> {
 fn block(statement: impl Strategy<Value = String>) -> impl Strategy<Value = String> {
     let lines = proptest::collection::vec((gap(), space(), statement, behind()), 0..5);
     (lines, behind(), gap()).prop_map(|(lines, open, end)| {
-        let line = |(above, indent, stmt, behind): (String, &str, String, String)| {
-            // A brace that stands further left than its block's first line is taken for one of an outer block.
-            let indent = if stmt.ends_with('}') { "" } else { indent };
-            format!("{above}{indent}{stmt} {behind}\n")
-        };
+        let line =
+            |(above, indent, stmt, behind): (String, &str, String, String)| format!("{above}{indent}{stmt} {behind}\n");
         let lines: String = lines.into_iter().map(line).collect();
         format!("{{{open}\n{lines}{end}}}")
     })

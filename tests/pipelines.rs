@@ -366,6 +366,52 @@ fn completions_are_scripts_that_their_shells_read() {
 }
 
 #[test]
+fn completions_offer_what_is_documented() {
+    let folder = Folder::empty("offered");
+    let documented = fs::read_to_string(folder::root().join("docs/src/command_line.md")).unwrap();
+    let word = |c: char| c.is_ascii_lowercase() || c == '-';
+    for (shell, before) in [("bash", " --"), ("zsh", "'--"), ("fish", "\" -l ")] {
+        let script = folder.gonogo(&["completions", shell]).out;
+        let offered = script.match_indices(before).map(|(i, _)| &script[i + before.len()..]);
+        let names = offered.map(|rest| &rest[..rest.find(|c| !word(c)).unwrap_or(rest.len())]);
+        let names: Vec<&str> = names.filter(|name| name.len() > 1).collect();
+        assert!(names.contains(&"deps-format"), "{shell}: {names:?}");
+        for name in names {
+            assert!(documented.contains(&format!("--{name}")), "{shell} offers `--{name}`, which nobody knows");
+        }
+    }
+}
+
+#[test]
+fn the_library_can_be_looked_through() {
+    let folder = Folder::empty("shelf");
+    folder.gonogo(&["std", "list"]).expect(
+        0,
+        &[
+            "std/iso4762: Socket head cap screws after ISO 4762:2004, in the lengths of ISO 888\n  iso4762(d, l)\n    d = M1.6 M2 ",
+            "std/materials: Surfaces of standard parts\n  material std_steel\n",
+        ],
+    );
+    let run = folder.gonogo(&["std", "list", "--message-format", "json"]);
+    let shelves: Vec<serde_json::Value> = run.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(shelves.len(), gonogo::design::library::files().count());
+    for shelf in &shelves {
+        assert!(!shelf["title"].as_str().unwrap().is_empty(), "{shelf}");
+        for family in shelf["families"].as_array().unwrap() {
+            for parameter in family["parameters"].as_array().unwrap() {
+                assert!(!parameter["sizes"].as_array().unwrap().is_empty(), "{family}");
+            }
+        }
+    }
+    let text = gonogo::design::library::text("std/iso4762").unwrap();
+    for name in ["iso4762", "std/iso4762"] {
+        assert_eq!(folder.gonogo(&["std", "show", name]).expect(0, &[]).out, text);
+    }
+    folder.gonogo(&["std", "show", "iso2338_h8"]).expect(0, &["part iso2338(d, l) {"]);
+    folder.gonogo(&["std", "show", "iso4763"]).expect(2, &["no `iso4763`", "did you mean `std/iso4762`?"]);
+}
+
+#[test]
 fn there_is_a_manual_page_for_every_command() {
     let folder = Folder::empty("man");
     folder.gonogo(&["man", "pages"]).expect(0, &[]);

@@ -306,3 +306,34 @@ fn feature() -> impl Strategy<Value = String> {
     (select(&operations), select(&shapes), select(&places))
         .prop_map(|(operation, shape, place)| format!("{operation} NAME = {shape}{place}"))
 }
+
+/// Layout is a hint where a bracket is missing, and nothing where none is.
+#[test]
+fn valid_text_is_read_however_it_is_laid_out() {
+    for text in [
+        // The `}` of an inner block lines up with the outer one.
+        "station s {\n    camera fixed {\n        focal = 16\n}\n    light l = room()\n}\n",
+        "part p {\n      cut c = group {\n      add a = sphere(d = 1)\n  }\n    add b = sphere(d = 1)\n  }\n",
+        // Words that begin blocks, as names inside parentheses.
+        "let a = (\npart.top\n)\n",
+        "let a = (\npart\n  + 1)\n",
+        "let a = (\npart\n+ 1)\n",
+        "let a = (1 +\nstation\n    - assembly.b)\npart p {\n}\n",
+        // Beside the same inside a block.
+        "part p {\nadd a = box(x = (\ntrain\n), y = 2)\n}\ntrain {\nimages = 3\n}\n",
+    ] {
+        let (file, diagnostics) = parse(text, 0);
+        assert!(diagnostics.is_empty() && file.lost.is_empty(), "{diagnostics:#?}\n{text}");
+        assert_eq!(meaning(&format(text).unwrap()), meaning(text));
+    }
+}
+
+/// Guesses are made where something is wrong, and nowhere else.
+#[test]
+fn a_fault_of_one_item_leaves_the_others_as_they_are() {
+    let odd = "station s {\n    camera fixed {\n        focal = 16\n}\n    light l = room()\n}\n";
+    let text = format!("{odd}part p {{\n    add a = sphere(d = (1 + ))\n}}\n{odd}");
+    let (file, diagnostics) = parse(&text, 0);
+    assert_eq!(diagnostics.iter().map(|d| d.code).collect::<Vec<_>>(), ["E0101"], "{diagnostics:#?}");
+    assert_eq!(file.lines.len(), 3);
+}

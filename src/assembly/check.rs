@@ -154,6 +154,19 @@ fn nearest_face(
     best
 }
 
+/// How far two solids in one frame stand apart (mm, by their triangles), and the face of the second that is nearest, where
+/// that is plain to say.
+pub(crate) fn apart<'a>(a: &Solid, b: &'a Solid) -> Option<(f64, Option<&'a str>)> {
+    let (face, distance) = nearest_on(b, &a.mesh.positions, f64::INFINITY)?;
+    /// Nearer by less than this (mm) is as far.
+    const SLACK: f64 = 1e-6;
+    // A corner of the second may be nearer to a face of the first.
+    Some(match nearest_on(a, &b.mesh.positions, distance - SLACK) {
+        Some((_, nearer)) => (nearer, None),
+        None => (distance, Some(b.faces[face].name.as_str())),
+    })
+}
+
 /// The face of a solid nearest to some points in its frame, if nearer than a limit (mm).
 fn nearest_on(solid: &Solid, points: &[Point3<f64>], limit: f64) -> Option<(usize, f64)> {
     let near = Bounds::of(points);

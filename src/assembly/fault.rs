@@ -6,9 +6,10 @@
 
 use super::insertion::Insertion;
 use super::liaison::Liaison;
+use super::piece;
 use super::place::place;
 use super::turn::{Turn, Turning, turns};
-use crate::design::model::{Design, Expr};
+use crate::design::model::{Design, Expr, Values};
 use crate::solid::{Solid, Surface};
 use nalgebra::{Isometry3, Translation3, Unit, Vector3};
 use serde::Serialize;
@@ -113,8 +114,9 @@ pub fn all(design: &Design, liaison: &Liaison, insertion: &Insertion, solids: &[
 /// the solid.
 pub fn wrong_parts(design: &Design, liaison: &Liaison, solids: &[Arc<Solid>]) -> Vec<ErrorMode> {
     let watched = design.inspect.watch.iter().map(|w| w.component).filter(|c| *c != 0);
+    let nominal = design.nominal();
     let of_one = |component: usize| {
-        let motions = swaps(design, liaison, solids, component).into_iter();
+        let motions = swaps(design, &nominal, liaison, solids, component).into_iter();
         motions.map(move |motion| ErrorMode { component, kind: FaultKind::WrongPart, motion })
     };
     watched.flat_map(of_one).collect()
@@ -182,14 +184,16 @@ fn engaged_length(liaison: &Liaison, component: usize, direction: Unit<Vector3<f
 }
 
 /// Components whose part could stand in this one's place: another part, held by the same neighbours in the same way, and
-/// no thicker than the holes here.
-fn swaps(design: &Design, liaison: &Liaison, solids: &[Arc<Solid>], component: usize) -> Vec<Motion> {
+/// no thicker than the holes here. Another piece of the same part is as right as this one.
+fn swaps(design: &Design, nominal: &Values, liaison: &Liaison, solids: &[Arc<Solid>], component: usize) -> Vec<Motion> {
     let part = |c: usize| design.components[c].part;
+    let own = &design.parts[part(component)];
     let mut parts = vec![part(component)];
     let mut found = Vec::new();
     for other in 1..liaison.components {
         let alike = seat(liaison, component) == seat(liaison, other) && !seat(liaison, other).is_empty();
-        if alike && !parts.contains(&part(other)) && enters(liaison, solids, other, component) {
+        let another = || !parts.contains(&part(other)) && !piece::alike(own, &design.parts[part(other)], nominal);
+        if alike && another() && enters(liaison, solids, other, component) {
             parts.push(part(other));
             found.push(Motion::Replace { by: other, name: design.components[other].name.clone() });
         }
@@ -258,6 +262,25 @@ mod tests {
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].component, 9);
         assert_eq!(found[0].motion, Motion::Replace { by: 8, name: "hd_pin".into() });
+    }
+
+    /// The design has an entry for every piece of a part: two equal pins are two parts there.
+    #[test]
+    fn pieces_of_one_part_are_not_wrong_in_each_others_place() {
+        let pinned = |second: f64| {
+            let mut shop = sample::Shop::default();
+            let holes = [-6.0, 6.0].map(|x| sample::Cut::hole("hole", x, 0.0, 4.0, 0.012));
+            let plate = shop.plate("plate", [5.0, 0.0], [30.0, 0.0], &holes);
+            let pins = [4.0, second].map(|d| shop.pin("pin", &[("shank", d, d, [-0.012, -0.004], 10.0)]));
+            shop.place("plate", plate, [0.0; 3], 0.0, 0.0);
+            shop.place("pin[1]", pins[0], [-6.0, 0.0, 0.0], 0.0, 0.0);
+            shop.place("pin[2]", pins[1], [6.0, 0.0, 0.0], 0.0, 0.0);
+            let a = shop.finish();
+            let liaison = Liaison::new(a.design.components.len(), contacts(&a.design, &a.solids));
+            wrong_parts(&a.design, &liaison, &a.solids).len()
+        };
+        assert_eq!(pinned(4.0), 0);
+        assert!(pinned(3.998) > 0, "a pin that is not the same is another part");
     }
 
     #[test]

@@ -32,6 +32,8 @@ mod stack;
 mod tangent;
 mod tight;
 
+pub(crate) use check::apart;
+
 use crate::design::model::Design;
 use crate::diag::Diagnostic;
 use crate::solid::Solid;

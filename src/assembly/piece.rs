@@ -50,6 +50,11 @@ impl Workshop {
     }
 }
 
+/// Whether two pieces are the same at these dimensions: the same features with the same names and numbers, of one material.
+pub fn alike(a: &Part, b: &Part, values: &Values) -> bool {
+    a.material == b.material && key(a, values) == key(b, values)
+}
+
 /// What a piece is made of, as numbers.
 fn key(part: &Part, values: &Values) -> Vec<u64> {
     let mut key = Key { values, words: Vec::new() };

@@ -2,6 +2,7 @@
 
 use super::deps::{Deps, DepsFormat};
 use super::keep::Keeping;
+use super::library::Std;
 use super::messages::levels;
 use super::output::Failure;
 use super::shells::{Completions, Man};
@@ -79,6 +80,9 @@ pub enum Command {
     Golden(Golden),
     /// Turn an OpenSCAD design (`openscad -o part.csg part.scad`) into a part with general tolerances.
     Import(Import),
+    /// What the parts library has: `gonogo std list`.
+    #[command(subcommand)]
+    Std(Std),
     /// Compile the pattern wheel, calibrate it, and judge the photos that come with it.
     Demo(Demo),
     /// Serve editors: the Language Server Protocol on standard input and output.

@@ -14,6 +14,7 @@ mod golden;
 mod import;
 mod judge;
 mod keep;
+mod library;
 mod lsp;
 mod messages;
 mod output;
@@ -75,6 +76,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Golden(Golden::Check(args)) => golden::check(args, global),
         Command::Golden(Golden::Bless(args)) => golden::bless(args, global),
         Command::Import(args) => import::import(args, global),
+        Command::Std(args) => library::std(args, global),
         Command::Demo(args) => demo::demo(args, global),
         Command::Lsp(_) => lsp::lsp(),
         Command::Completions(args) => shells::completions(args),

@@ -22,8 +22,8 @@ pub struct Watch {
     /// Do it again whenever a spec or a file that it uses changes; ends when standard input does, if that is no terminal.
     #[arg(long)]
     pub watch: bool,
-    /// Stop after so many rounds.
-    #[arg(long, value_name = "N", requires = "watch", hide = true)]
+    /// Stop watching after so many rounds.
+    #[arg(long, value_name = "N", requires = "watch")]
     pub rounds: Option<u64>,
 }
 

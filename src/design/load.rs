@@ -395,10 +395,12 @@ impl Resolver {
             }
             Stmt::Part { name, body } => {
                 self.block_name("part", name, first_part(name, blocks));
+                self.names_inside(name, body);
                 blocks.parts.push((PartSource { name, body, member: None }, used));
             }
             Stmt::Family { name, params, body } => {
                 self.block_name("family", name, first_part(name, blocks));
+                self.names_inside(name, body);
                 blocks.families.push((Family { name, params, body }, used));
             }
             Stmt::Member { name, call } => {
@@ -422,6 +424,14 @@ impl Resolver {
                 blocks.train.get_or_insert((body, line.span));
             }
             _ => {}
+        }
+    }
+
+    fn names_inside(&mut self, owner: &ast::Name, body: &ast::Body) {
+        for line in &body.lines {
+            if let Stmt::Let { name, .. } = &line.stmt {
+                self.inside.entry(name.text.clone()).or_insert((owner.text.clone(), name.span));
+            }
         }
     }
 

@@ -40,6 +40,8 @@ impl Resolver {
         self.warn_unused_locals();
         self.warn_unused_outlines();
         self.read_unread_names(true);
+        // They end with the part: a placement or a station that asks for one asks for what nobody can see.
+        self.locals = BTreeMap::new();
         let material = self.part_material(source, materials);
         Part { name: source.name.text.clone(), material, features, span: source.name.span }
     }

@@ -90,6 +90,8 @@ pub struct Resolver {
     /// File-wide names, and those of the part at hand.
     pub globals: BTreeMap<String, Named>,
     pub locals: BTreeMap<String, Named>,
+    /// The `let`s inside parts and families by name: in which, and where. Others ask for them in vain.
+    pub inside: BTreeMap<String, (String, Span)>,
     /// Names that were used: what is not is warned of.
     pub used: BTreeSet<Span2>,
     /// Families that a member was taken from.
@@ -231,9 +233,17 @@ impl Resolver {
         let near = nearest(name, known).map(str::to_string);
         let diagnostic =
             Diagnostic::error("E0201", span, format!("no dimension is named `{name}`")).label("unknown name");
-        self.report(match near {
-            Some(near) => diagnostic.meant(span, &near),
-            None => diagnostic.help(format!("define it above: `let {name} = 10`")),
-        });
+        let diagnostic = match (near, self.inside.get(name)) {
+            (Some(near), None) => diagnostic.meant(span, &near),
+            (None, None) => diagnostic.help(format!("define it above: `let {name} = 10`")),
+            (near, Some((part, defined))) => {
+                let diagnostic = diagnostic.also(*defined, format!("this one belongs to the pieces of `{part}`"));
+                match near {
+                    Some(near) => diagnostic.meant(span, &near),
+                    None => diagnostic.help(format!("move that `let` out of `{part}`, to the top of the file")),
+                }
+            }
+        };
+        self.report(diagnostic);
     }
 }

@@ -51,6 +51,7 @@ const PAGES: &[(&str, &str)] = &[
     ("E0509", include_str!("explain/E0509.md")),
     ("E0601", include_str!("explain/E0601.md")),
     ("W0602", include_str!("explain/W0602.md")),
+    ("E0603", include_str!("explain/E0603.md")),
     ("E0605", include_str!("explain/E0605.md")),
     ("W0703", include_str!("explain/W0703.md")),
     ("E0801", include_str!("explain/E0801.md")),

@@ -2,19 +2,21 @@
 //!
 //! In: a text. Out: the same text with the `{` at the end of its head, byte for byte as long, and a diagnostic for each.
 
-use super::scan::{outside_strings, starts_block_item, strip_comment};
+use super::lines::{outside_strings, starts_block_item, strip_comment};
+use super::scan::Chunk;
 use crate::diag::{Applicability, Diagnostic, Fix, Span};
 
 /// Statements in a block that open a block of their own.
 const INNER: [&str; 5] = ["camera", "floor", "vary", "outline", "place"];
 
-/// Mends the heads of blocks in `text`, which belongs to `file`.
-pub fn mended(text: String, file: u32) -> (String, Vec<Diagnostic>) {
+/// Mends the heads of blocks in `text`, which belongs to `file`, outside of items that are known to be right.
+pub fn mended(text: &str, file: u32, sound: &[Chunk]) -> (String, Vec<Diagnostic>) {
     let mut bytes = text.as_bytes().to_vec();
     let mut diagnostics = Vec::new();
     let mut head: Option<Line> = None;
-    for line in lines(&text) {
-        if let Some(head) = head.as_ref().filter(|head| head.may_open()) {
+    for line in lines(text) {
+        let is_sound = |head: &Line| sound.iter().any(|chunk| (chunk.start..chunk.end).contains(&head.start));
+        if let Some(head) = head.as_ref().filter(|head| head.may_open() && !is_sound(head)) {
             let span = |at: usize, len: usize| Span { file, start: at as u32, end: (at + len) as u32 };
             let end = head.start + head.code.len();
             let blank = text.as_bytes().get(end).is_some_and(u8::is_ascii_whitespace);
@@ -49,7 +51,7 @@ pub fn mended(text: String, file: u32) -> (String, Vec<Diagnostic>) {
         head = Some(line);
     }
     // Blanks and braces only have been replaced, by braces and blanks.
-    (String::from_utf8(bytes).unwrap_or(text), diagnostics)
+    (String::from_utf8(bytes).unwrap_or_else(|_| text.to_string()), diagnostics)
 }
 
 /// A line that is more than a comment, without its comment.
@@ -99,7 +101,7 @@ mod tests {
     use crate::diag::apply;
 
     fn both(text: &str) -> (String, String) {
-        let (read, diagnostics) = mended(text.to_string(), 0);
+        let (read, diagnostics) = mended(text, 0, &[]);
         assert_eq!(read.len(), text.len());
         (read, apply(text, 0, diagnostics.iter().flat_map(|d| &d.fixes)).0)
     }

@@ -4,7 +4,7 @@
 //! In: a text. Out: the same text with what was meant in their place, byte for byte as long, so that every span holds for
 //! both, and one diagnostic for every kind of sign. The parser reads on as if nothing had been.
 
-use super::scan::{outside_strings, strip_comment};
+use super::lines::{outside_strings, strip_comment};
 use crate::diag::{Applicability, Diagnostic, Fix, Span};
 use std::collections::BTreeMap;
 

@@ -9,6 +9,7 @@ mod faults;
 mod format;
 mod heads;
 mod letters;
+mod lines;
 mod parse;
 mod scan;
 mod table;

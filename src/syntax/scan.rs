@@ -4,6 +4,9 @@
 //! up, and the repairs with which the parser can read on. A parser alone would report a lost `}` at the next item;
 //! indentation tells where it was meant to be.
 
+use super::lines::{
+    line_end, line_number, outside_strings, owner, starts_block_item, starts_statement, strip_comment, trailing_gap,
+};
 use crate::diag::{Diagnostic, Span};
 use std::ops::Range;
 
@@ -35,43 +38,57 @@ pub struct Scanned {
     pub lost: Vec<Range<usize>>,
 }
 
-/// Cuts `text` at the lines that begin outside all brackets.
+/// Cuts `text` at the lines that begin outside all brackets. `reads` tells whether an item parses.
+///
+/// Where brackets seem not to pair up, the lines tell where they were meant to; but that is a guess, and an item that parses
+/// as it stands is right, however it is laid out.
 ///
 /// Where braces do not pair up, indentation is asked a second time: a line that stands no deeper than the head of the block
 /// it would be in does not belong to it. A text whose braces pair up may be indented as it likes.
-pub fn scan(text: &str, file: u32) -> Scanned {
-    let plain = scan_once(text, file, false);
+pub fn scan(text: &str, file: u32, reads: &dyn Fn(&str) -> bool) -> Scanned {
+    let plain = scan_once(text, file, Guess::BySlips, &[]);
+    if plain.diagnostics.is_empty() {
+        return plain;
+    }
+    let sound = sound(text, &plain.diagnostics, reads);
+    let plain = if sound.is_empty() { plain } else { scan_once(text, file, Guess::BySlips, &sound) };
     if !plain.diagnostics.iter().any(|d| d.code == "E0102") {
         return plain;
     }
-    let strict = scan_once(text, file, true);
+    let strict = scan_once(text, file, Guess::ByIndent, &sound);
     if strict.diagnostics.len() <= plain.diagnostics.len() { strict } else { plain }
 }
 
-fn scan_once(text: &str, file: u32, strict: bool) -> Scanned {
-    let mut scanner = Scanner {
-        text,
-        file,
-        strict,
-        open: Vec::new(),
-        chunks: Vec::new(),
-        diagnostics: Vec::new(),
-        repairs: Vec::new(),
-        lost: Vec::new(),
-        broken: false,
-        early: None,
-        code_end: 0,
-        line_start: 0,
-    };
-    let mut start = 0;
-    for line in text.split_inclusive('\n') {
-        scanner.line(start, line);
-        start += line.len();
+/// The items that parse as they stand, of those that guesses have found fault with.
+pub fn sound(text: &str, faults: &[Diagnostic], reads: &dyn Fn(&str) -> bool) -> Vec<Chunk> {
+    let mut scanner = Scanner::new(text, 0, Guess::Nothing, &[]);
+    scanner.run();
+    if scanner.unpaired {
+        return Vec::new();
     }
-    scanner.lose_all_open("the end of the file");
-    scanner.finish_chunk(text.len());
+    let blamed = |chunk: &Chunk| {
+        let place = |d: &Diagnostic| d.labels[0].span.start as usize;
+        faults.iter().any(|d| (chunk.start..=chunk.end).contains(&place(d)))
+    };
+    scanner.chunks.retain(|chunk| !chunk.broken && blamed(chunk) && reads(&text[chunk.start..chunk.end]));
+    scanner.chunks
+}
+
+fn scan_once(text: &str, file: u32, guess: Guess, sound: &[Chunk]) -> Scanned {
+    let mut scanner = Scanner::new(text, file, guess, sound);
+    scanner.run();
     let Scanner { chunks, diagnostics, repairs, lost, .. } = scanner;
     Scanned { chunks, diagnostics, repairs, lost }
+}
+
+/// What is taken for a sign that a bracket was forgotten.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Guess {
+    Nothing,
+    /// Statements inside parentheses, blocks inside blocks, a `}` below that of an outer block.
+    BySlips,
+    /// And every line that stands too far left.
+    ByIndent,
 }
 
 /// An opening bracket that still waits for its partner.
@@ -87,13 +104,17 @@ struct Open {
 struct Scanner<'a> {
     text: &'a str,
     file: u32,
-    strict: bool,
+    guess: Guess,
+    /// Items that are known to be right, in their order.
+    sound: &'a [Chunk],
     open: Vec<Open>,
     chunks: Vec<Chunk>,
     diagnostics: Vec<Diagnostic>,
     repairs: Vec<(usize, u8)>,
     lost: Vec<Range<usize>>,
     broken: bool,
+    /// Some bracket has no partner.
+    unpaired: bool,
     early: Option<Early>,
     /// The end of the last code before the line at hand.
     code_end: usize,
@@ -109,7 +130,53 @@ struct Early {
     chunk: usize,
 }
 
-impl Scanner<'_> {
+impl<'a> Scanner<'a> {
+    fn new(text: &'a str, file: u32, guess: Guess, sound: &'a [Chunk]) -> Self {
+        Scanner {
+            text,
+            file,
+            guess,
+            sound,
+            open: Vec::new(),
+            chunks: Vec::new(),
+            diagnostics: Vec::new(),
+            repairs: Vec::new(),
+            lost: Vec::new(),
+            broken: false,
+            unpaired: false,
+            early: None,
+            code_end: 0,
+            line_start: 0,
+        }
+    }
+
+    fn run(&mut self) {
+        let mut start = 0;
+        for line in self.text.split_inclusive('\n') {
+            if !self.take_sound(start) {
+                self.line(start, line);
+            }
+            start += line.len();
+        }
+        self.take_sound(self.text.len());
+        self.lose_all_open("the end of the file");
+        self.finish_chunk(self.text.len());
+    }
+
+    /// Whether the line at `start` belongs to an item that is known to be right. Such an item is taken whole.
+    fn take_sound(&mut self, start: usize) -> bool {
+        while let Some((chunk, later)) = self.sound.split_first().filter(|(chunk, _)| chunk.end <= start) {
+            if !self.open.is_empty() {
+                self.lose_all_open(&format!("line {}", line_number(self.text, chunk.start)));
+            }
+            self.finish_chunk(chunk.start);
+            self.chunks.push(chunk.clone());
+            self.sound = later;
+            self.code_end = chunk.end;
+        }
+        self.sound.first().is_some_and(|chunk| chunk.start <= start)
+    }
+
     fn line(&mut self, start: usize, line: &str) {
         let code = strip_comment(line);
         self.line_start = start;
@@ -119,13 +186,13 @@ impl Scanner<'_> {
         }
         let indent = code.len() - words.len();
         self.lose_parentheses_before(words);
-        if self.strict && !words.starts_with('}') {
+        if self.guess == Guess::ByIndent && !words.starts_with('}') {
             self.lose_blocks_left_by(indent);
         }
         if let Some(open) = self.open.last_mut().filter(|o| o.bracket == b'{') {
             open.inner.get_or_insert(indent);
         }
-        if indent == 0 && !self.open.is_empty() && starts_block_item(words) {
+        if self.guess != Guess::Nothing && indent == 0 && !self.open.is_empty() && starts_block_item(words) {
             self.lose_all_open(&format!("line {}", line_number(self.text, start)));
         }
         if self.open.is_empty() && !words.starts_with('}') {
@@ -200,6 +267,7 @@ impl Scanner<'_> {
 
     /// A `)` too many, or a `(` too few: `cylinder d = 9)`.
     fn closes_no_parenthesis(&mut self, at: usize) {
+        self.unpaired = true;
         if self.has_enough() {
             return;
         }
@@ -236,6 +304,7 @@ impl Scanner<'_> {
 
     /// A `}` too many: the one that came too early, if there is one, else this.
     fn closes_no_block(&mut self, at: usize) {
+        self.unpaired = true;
         if self.has_enough() {
             return;
         }
@@ -272,7 +341,8 @@ impl Scanner<'_> {
     /// A `}` that lines up with an outer block shows that the inner ones lost theirs.
     fn lose_blocks_deeper_than(&mut self, indent: usize, at: usize) {
         let aligned = |o: &Open| o.bracket == b'{' && o.indent == indent;
-        if self.open.last().is_some_and(aligned) || !self.open.iter().any(aligned) {
+        let guess = self.guess != Guess::Nothing && self.open.iter().any(aligned);
+        if self.open.last().is_some_and(aligned) || !guess {
             return;
         }
         while !self.open.last().is_some_and(aligned) {
@@ -282,7 +352,8 @@ impl Scanner<'_> {
 
     /// A statement cannot begin inside parentheses: they were left open above.
     fn lose_parentheses_before(&mut self, words: &str) {
-        while self.open.last().is_some_and(|o| o.bracket == b'(') && starts_statement(words) {
+        let guess = self.guess != Guess::Nothing && starts_statement(words);
+        while guess && self.open.last().is_some_and(|o| o.bracket == b'(') {
             self.lose_last("this line", self.line_start);
         }
     }
@@ -296,7 +367,11 @@ impl Scanner<'_> {
     }
 
     fn lose_last(&mut self, before: &str, limit: usize) {
-        let Some(open) = self.open.pop().filter(|_| !self.has_enough()) else { return };
+        let Some(open) = self.open.pop() else { return };
+        self.unpaired = true;
+        if self.has_enough() {
+            return;
+        }
         if open.bracket == b'{' { self.lose_block(&open, before) } else { self.lose_parenthesis(&open, limit) }
     }
 
@@ -370,67 +445,4 @@ impl Scanner<'_> {
         chunk.end = chunk.start + body.len() - trailing_gap(body);
         chunk.broken = broken;
     }
-}
-
-/// Bytes of the blank and comment-only lines at the end of `body`.
-fn trailing_gap(body: &str) -> usize {
-    let gap = |line: &&str| strip_comment(line).trim().is_empty();
-    body.split_inclusive('\n').rev().take_while(gap).map(str::len).sum()
-}
-
-/// The line without its comment; a `//` inside a string is no comment.
-pub fn strip_comment(line: &str) -> &str {
-    let slashes = outside_strings(line).find(|&(at, b)| b == b'/' && line[at..].starts_with("//"));
-    slashes.map_or(line, |(at, _)| &line[..at])
-}
-
-/// The bytes of a line that are not inside a string.
-pub fn outside_strings(line: &str) -> impl Iterator<Item = (usize, u8)> {
-    let mut inside = false;
-    line.bytes().enumerate().filter(move |&(_, b)| {
-        inside ^= b == b'"';
-        !inside && b != b'"'
-    })
-}
-
-/// `part pin {`: an item that cannot stand inside another.
-pub fn starts_block_item(words: &str) -> bool {
-    let end = words.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(words.len());
-    let (first, rest) = words.split_at(end);
-    let block = ["material", "part", "assembly", "station", "inspect", "train"];
-    block.contains(&first) && !rest.trim_start().starts_with('=')
-}
-
-fn starts_statement(words: &str) -> bool {
-    let first = words.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next().unwrap_or("");
-    let rest = words[first.len()..].trim_start();
-    let keyword = [
-        "add", "cut", "keep", "let", "place", "root", "measure", "outline", "line", "arc", "light", "camera", "vary",
-        "floor", "watch", "ignore",
-    ];
-    (keyword.contains(&first) && rest.starts_with(|c: char| c.is_ascii_alphabetic() || c == '{'))
-        || starts_block_item(words)
-        || words.starts_with('}')
-}
-
-/// The end of the line that `at` stands on, without its line break.
-fn line_end(text: &str, at: usize) -> usize {
-    let rest = &text[at..];
-    at + rest.find('\n').map_or(rest.len(), |i| rest[..i].trim_end_matches('\r').len())
-}
-
-/// `of material `steel``, from the words in front of a brace.
-fn owner(text: &str, brace: usize) -> String {
-    let line = text[..brace].rsplit('\n').next().unwrap_or("").trim();
-    let mut words = line.split_whitespace();
-    match (words.next(), words.next()) {
-        (Some(kind), Some(name)) => format!(" of {kind} `{name}`"),
-        (Some(kind), None) => format!(" of `{kind}`"),
-        _ => String::new(),
-    }
-}
-
-/// Line of a byte offset, counted from 1.
-pub fn line_number(text: &str, at: usize) -> usize {
-    text.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1
 }

@@ -8,6 +8,7 @@
 //! same surface always helps. Before the score come two demands: all that is watched stays inside the image wherever the
 //! assembly may stand, and as many of the watched components as possible are seen at all.
 
+use super::blocked;
 use super::item_buffer::{ItemBuffer, PixelGrid};
 use super::nodes::{Seen, seen_on_grid};
 use crate::assembly::contact::FaceRef;
@@ -66,7 +67,7 @@ pub struct Choice {
     pub camera: Camera,
     /// What it sees, at full size.
     pub seen: Vec<Seen>,
-    /// E0601 for every watched component it does not see.
+    /// E0601 for every watched component it does not see, E0603 for what stands inside of something.
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -105,7 +106,12 @@ fn chosen(design: &Design, station: &Station, bodies: &[Body], table: Vec<Scored
     let camera = build::camera(&station.camera, table[best].placing);
     let grid = PixelGrid::of(&camera);
     let seen = seen_on_grid(bodies, &camera, &ItemBuffer::on_grid(bodies, &camera, &grid), &grid);
-    let diagnostics = unseen(design, station, &table, &seen);
+    // From inside of a part nothing is seen; one mistake is one diagnostic.
+    let mut diagnostics = match blocked::camera(design, station, bodies, &camera) {
+        Some(fault) => vec![fault],
+        None => unseen(design, station, &table, &seen),
+    };
+    diagnostics.extend(blocked::lamps(design, station, bodies));
     Choice { best, table, camera, seen, diagnostics }
 }
 
@@ -303,7 +309,9 @@ fn describe(view: &Scored, watch: usize) -> String {
 mod tests {
     use super::super::shapes::{block, body, placed};
     use super::*;
-    use crate::design::model::{CameraSpec, Component, Inspect, PoseExpr, Response, Train, Watch};
+    use crate::design::model::{
+        CameraSpec, Component, Floor, Inspect, LightShape, LightSpec, PoseExpr, Response, Train, Watch,
+    };
     use crate::diag::Span;
 
     fn station(placing: CameraPlacing) -> Station {
@@ -432,6 +440,27 @@ mod tests {
             assert!(fault.message.contains("`part[4]`: 0 of "), "{}", fault.message);
             assert_eq!(fault.message.starts_with("no allowed camera"), is_auto);
         }
+    }
+
+    #[test]
+    fn cameras_and_lamps_inside_of_parts_or_below_the_floor_are_errors() {
+        let faults = |distance: f64, lamp: [f64; 3]| -> Vec<String> {
+            let elevation = 90f64.to_radians();
+            let mut station = station(CameraPlacing::Fixed { distance, elevation, azimuth: 0.0 });
+            let shape = LightShape::Panel { width: 100.0, height: 100.0, at: lamp, aim: [0.0; 3] };
+            station.lights.push(LightSpec { name: "top".into(), shape, power: 1.0, drift: 0.1, span: Span::default() });
+            station.floor = Some(Floor { z: -5.0, material: 0 });
+            let choice = choose(&design(3, &[2]), &station, &niche(), &[]);
+            choice.diagnostics.iter().map(|d| format!("{} {}", d.code, d.message)).collect()
+        };
+        assert_eq!(faults(300.0, [0.0, 0.0, 400.0]), [""; 0]);
+        // The aim is at z = 10, the small block reaches from 4 to 14.
+        assert_eq!(faults(2.0, [0.0, 0.0, 400.0]), ["E0603 the camera of station `S` stands inside `part[3]`"]);
+        assert_eq!(faults(300.0, [20.0, 20.0, 2.0]), ["E0603 light `top` of station `S` stands inside `part[1]`"]);
+        assert_eq!(
+            faults(300.0, [200.0, 0.0, -6.0]),
+            ["E0603 light `top` of station `S` stands below the floor, which is at z = -5"]
+        );
     }
 
     #[test]

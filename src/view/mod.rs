@@ -3,6 +3,7 @@
 //! In: bodies in the station's frame, cameras, the faces that matter. Out: item buffers, what is seen of each component,
 //! masks of change, the chosen camera. Never shades and never traces a ray: geometry and counting only.
 
+mod blocked;
 pub mod choose;
 pub mod item_buffer;
 pub mod lock;

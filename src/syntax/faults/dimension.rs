@@ -1,6 +1,6 @@
 //! Slips in a dimension: what is written on paper and means something else here.
 
-use super::super::scan::strip_comment;
+use super::super::lines::strip_comment;
 use super::{Slip, line_start};
 
 /// Recognises the usual slips in the dimension around `at`.

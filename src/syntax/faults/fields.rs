@@ -1,7 +1,7 @@
 //! Slips in `name = value` and in lists of them: a missing or doubled sign, brackets of another kind, a file name without
 //! quotes, a count without its x.
 
-use super::super::scan::strip_comment;
+use super::super::lines::strip_comment;
 use super::{Slip, is_word, is_word_letter, line_start, token_at};
 
 /// Words that begin statements, and are no names of fields where one seems to miss its `=`.

@@ -208,7 +208,8 @@ fn keyword_meant(found: &str, expected: &[&str]) -> Option<String> {
         .filter_map(|w| w.strip_prefix('`')?.strip_suffix('`'))
         .filter(|w| w.starts_with(|c: char| c.is_ascii_alphabetic()))
         .collect();
-    let glued = keywords.iter().find(|k| found.len() > k.len() && found.starts_with(**k));
+    // One letter too many is a slip of the finger: `onn` is no `on n`.
+    let glued = keywords.iter().find(|k| found.len() > k.len() + 1 && found.starts_with(**k));
     let same = keywords.iter().find(|k| k.eq_ignore_ascii_case(found));
     match (same, glued) {
         (Some(keyword), _) => Some(keyword.to_string()),

@@ -8,7 +8,8 @@ mod words;
 
 use super::ast::{File, Gap, Line};
 use super::faults::{self, Fault};
-use super::scan::{Scanned, scan, strip_comment};
+use super::lines::strip_comment;
+use super::scan::{self, Scanned, scan};
 use super::{heads, letters};
 use crate::diag::{self, Diagnostic, Fix, Span};
 use build::Builder;
@@ -36,9 +37,9 @@ pub fn parse(text: &str, file: u32) -> (File, Vec<Diagnostic>) {
         return (File { lost, ..File::default() }, vec![fault]);
     }
     let letters::Cleaned { text: clean, mut diagnostics, lost } = letters::clean(text, file);
-    let (clean, found) = heads::mended(clean, file);
+    let (clean, found) = with_heads(clean, file);
     diagnostics.extend(found);
-    let scanned = scan(&clean, file);
+    let scanned = scan(&clean, file, &reads);
     diagnostics.extend(checked(scanned.diagnostics.clone(), &clean));
     let clean = repaired(clean, &scanned);
     let mut tree = File { lost, ..File::default() };
@@ -59,6 +60,21 @@ pub fn parse(text: &str, file: u32) -> (File, Vec<Diagnostic>) {
     (tree, diagnostics)
 }
 
+/// Whether an item parses as it stands.
+fn reads(item: &str) -> bool {
+    Grammar::parse(Rule::chunk, item).is_ok()
+}
+
+/// The text with the heads of its blocks mended where it does not parse.
+fn with_heads(text: String, file: u32) -> (String, Vec<Diagnostic>) {
+    let (mended, found) = heads::mended(&text, file, &[]);
+    if found.is_empty() {
+        return (text, found);
+    }
+    let sound = scan::sound(&text, &found, &reads);
+    if sound.is_empty() { (mended, found) } else { heads::mended(&text, file, &sound) }
+}
+
 /// Keeps the fix of each bracket that leaves fewer of them unpaired and a statement that can be read.
 fn checked(mut diagnostics: Vec<Diagnostic>, text: &str) -> Vec<Diagnostic> {
     let count = diagnostics.len();
@@ -70,7 +86,7 @@ fn checked(mut diagnostics: Vec<Diagnostic>, text: &str) -> Vec<Diagnostic> {
         }
         let helps = |fix: &Fix| {
             let (mended, made) = diag::apply(text, fix.edits.first().map_or(0, |e| e.span.file), [fix]);
-            let scanned = scan(&mended, 0);
+            let scanned = scan(&mended, 0, &reads);
             let pairs = !made.is_empty() && scanned.diagnostics.len() < count;
             pairs && is_readable(&repaired(mended, &scanned), &scanned, fix)
         };
