@@ -4,11 +4,14 @@
 //! masks of change, the chosen camera. Never shades and never traces a ray: geometry and counting only.
 
 pub mod choose;
+pub mod cover;
+pub mod escape;
 pub mod item_buffer;
 pub mod lock;
 pub mod nodes;
 pub mod picture;
 mod raster;
+mod shade;
 
 #[cfg(test)]
 mod shapes;
