@@ -36,8 +36,8 @@ fn shortlist(design: &Design, choice: &Choice) -> String {
         return rows;
     }
     format!(
-        "<h3>What each view lets pass</h3>\n<p>Of the views that score highest, each from another direction, the one is chosen \
-         whose worst fault is predicted to escape least.</p>\n<div class=\"scroll\"><table>\n<thead><tr>\
+        "<h3>What each view lets pass</h3>\n<p>The views that score highest, each from another direction, the chosen one first. What \
+         escapes is predicted from geometry: it compares views and promises nothing.</p>\n<div class=\"scroll\"><table>\n<thead><tr>\
          <th scope=\"col\">Azimuth</th><th scope=\"col\">Elevation</th><th scope=\"col\">Distance</th>\
          <th scope=\"col\">Score</th><th scope=\"col\">Worst escape</th><th scope=\"col\">Mean escape</th>\
          <th scope=\"col\">Escapes most</th></tr></thead>\n<tbody>{rows}</tbody></table></div>\n{}",
@@ -56,7 +56,7 @@ fn several(choice: &Choice) -> String {
         return String::new();
     }
     format!(
-        "<p>No view tells every fault that some view tells. It takes {} cameras, each a station of its own: {}.</p>\n",
+        "<p>By this prediction no view tells every fault that some view tells. It takes {} cameras, each a station of its own: {}.</p>\n",
         places.len(),
         places.join("; ")
     )
