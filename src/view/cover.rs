@@ -31,7 +31,7 @@ pub fn fewest(views: &[Weighed], first: usize) -> Vec<usize> {
         loop {
             tried += 1;
             if tried > MOST_SETS {
-                return greedy(first, &others, &modes, &told);
+                return greedy(first, &others, &modes, told);
             }
             let set: Vec<usize> = [first].into_iter().chain(places.iter().map(|&at| others[at])).collect();
             if covers(&set) {
