@@ -158,10 +158,16 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
     let bodies = line::bodies(&design, station, &solids);
     let targets = view::choose::targets(&assembly::error_tree::levels(&design, &analysis.liaison));
     let kept = line.kept_choice(&design, station)?;
-    let choice = match kept {
-        Some(placing) => view::choose::keep(&design, station, &bodies, &targets, placing),
-        None => view::choose::choose(&design, station, &bodies, &targets),
+    let weighs = view::lock::is_auto(station) && (kept.is_none() || line.options.keep);
+    let task = view::escape::Task {
+        design: &design,
+        station,
+        bodies: &bodies,
+        targets: &targets,
+        modes: &if weighs { modes() } else { Vec::new() },
+        solids: &solids,
     };
+    let choice = line::choice(line.options.keep, kept, &task);
     line.keep(|made| (made.bodies, made.choice) = (bodies.clone(), Some(choice.clone())));
     let camera = line.check((choice.camera, choice.diagnostics.clone()))?;
     line.lock(&design, station, &choice);

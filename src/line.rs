@@ -20,7 +20,8 @@ use crate::scene::build::{self, Instance, Placed};
 use crate::solid::{Quality, Solid};
 use crate::train::prove::Proof;
 use crate::train::{Job, Step, shots};
-use crate::view::choose::Choice;
+use crate::view::choose::{self, Choice};
+use crate::view::escape;
 use crate::view::lock::{self, Lock, Locked};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -272,6 +273,15 @@ impl<'a> Line<'a> {
         if self.options.wanted.contains(&artifact) {
             self.out.artifacts.extend(files());
         }
+    }
+}
+
+/// The camera as it was chosen before, for a report beside all that it was chosen from; or as it is chosen now.
+pub(crate) fn choice(shows_all: bool, kept: Option<Placed>, task: &escape::Task) -> Choice {
+    match kept {
+        Some(placing) if shows_all => escape::keep(task, placing),
+        Some(placing) => choose::keep(task.design, task.station, task.bodies, task.targets, placing),
+        None => escape::choose(task),
     }
 }
 

@@ -20,9 +20,11 @@ use crate::design::model::{
 };
 use crate::line::Stage;
 use crate::runtime::camera::Camera;
+use crate::scene::build::Placed;
 use crate::solid::{Solid, Surface};
 use crate::units::{Quantity, Range};
 use crate::view::choose::Choice;
+use crate::view::escape::Weighed;
 use crate::view::item_buffer::PixelBox;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -417,6 +419,12 @@ struct ViewSummary<'a> {
     size: [u32; 2],
     views_tried: usize,
     score: f64,
+    /// Best first: distance, elevation, azimuth, score, worst and mean predicted escape, and the mode that escapes most.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    shortlist: Vec<ShortlistSummary>,
+    /// Where cameras would have to stand that together tell what one alone does not: distance, elevation, azimuth.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cameras: Vec<[f64; 3]>,
     lamps: Vec<String>,
     seen: Named<SeenSummary>,
 }
@@ -429,6 +437,22 @@ struct SeenSummary {
     visible: Option<[u32; 4]>,
     pixels: [u32; 2],
     faces: usize,
+}
+
+type ShortlistSummary = (f64, f64, f64, f64, f64, f64, Option<String>);
+
+fn shortlisted(design: &Design, choice: &Choice, weighed: &Weighed) -> ShortlistSummary {
+    let view = &choice.table[weighed.view];
+    let weakest = weighed.weakest().filter(|mode| mode.share > 0.0);
+    let [distance, elevation, azimuth] = stands(view.placing);
+    let [worst, mean] = [weighed.worst(), weighed.mean()].map(|v| rounded(v, 3));
+    let weakest = weakest.map(|mode| format!("{} {}", design.components[mode.component].name, mode.kind.word()));
+    (distance, elevation, azimuth, rounded(view.score, 2), worst, mean, weakest)
+}
+
+/// mm and degrees.
+fn stands(Placed { distance, elevation, azimuth }: Placed) -> [f64; 3] {
+    [rounded(distance, 1), rounded(elevation.to_degrees(), 2), rounded(azimuth.to_degrees(), 2)]
 }
 
 /// Camera, lamps, and what is seen of every component.
@@ -452,6 +476,8 @@ pub fn view(design: &Design, station: &Station, choice: &Choice) -> String {
         size,
         views_tried: choice.table.len(),
         score: rounded(choice.table[choice.best].score, 2),
+        shortlist: choice.weighed().map(|w| shortlisted(design, choice, w)).collect(),
+        cameras: choice.several().map(|view| stands(view.placing)).collect(),
         lamps: crate::scene::build::lamps(station, &choice.camera).into_iter().map(|l| l.name).collect(),
         seen: Named(seen.collect()),
     };

@@ -34,7 +34,7 @@ pub fn section(assembly: &Assembly, view: &View, report: &Report) -> String {
          </div>\n{}{templates}",
         camera(view),
         picture::items(&buffer),
-        views::section(view.choice)
+        views::section(assembly.design, view.choice)
     )
 }
 

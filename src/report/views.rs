@@ -3,15 +3,17 @@
 //! In: a choice among several views. Out: an SVG in which a dot's angle is the camera's azimuth, its distance from the middle
 //! how far the camera leans from overhead, its tint the score; and a short table. Nothing for a camera that is fixed.
 
-use super::html::{at, number};
+use super::html::{at, escaped, number, percent};
+use crate::design::model::Design;
 use crate::view::choose::{Choice, Scored};
+use crate::view::escape::Weighed;
 
 /// Radius of the map (px).
 const RADIUS: f64 = 110.0;
 /// Views told in figures.
 const TOLD: usize = 5;
 
-pub fn section(choice: &Choice) -> String {
+pub fn section(design: &Design, choice: &Choice) -> String {
     if choice.table.len() < 2 {
         return String::new();
     }
@@ -21,8 +23,59 @@ pub fn section(choice: &Choice) -> String {
         "<h3>Views tried</h3>\n<div class=\"pair views\">{}<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Azimuth</th>\
          <th scope=\"col\">Elevation</th><th scope=\"col\">Distance</th><th scope=\"col\">All inside</th>\
          <th scope=\"col\">Surfaces</th><th scope=\"col\">px</th><th scope=\"col\">Score</th></tr></thead>\n\
-         <tbody>{rows}</tbody></table></div></div>\n",
-        map(&choice.table, best)
+         <tbody>{rows}</tbody></table></div></div>\n{}",
+        map(&choice.table, best),
+        shortlist(design, choice)
+    )
+}
+
+/// What each view of the shortlist buys: both scores, the chosen view first. Nothing where none was weighed.
+fn shortlist(design: &Design, choice: &Choice) -> String {
+    let rows: String = choice.weighed().map(|w| weighed(design, choice, w)).collect();
+    if rows.is_empty() {
+        return rows;
+    }
+    format!(
+        "<h3>What each view lets pass</h3>\n<p>The views that score highest, each from another direction, the chosen one first. What \
+         escapes is predicted from geometry: it compares views and promises nothing.</p>\n<div class=\"scroll\"><table>\n<thead><tr>\
+         <th scope=\"col\">Azimuth</th><th scope=\"col\">Elevation</th><th scope=\"col\">Distance</th>\
+         <th scope=\"col\">Score</th><th scope=\"col\">Worst escape</th><th scope=\"col\">Mean escape</th>\
+         <th scope=\"col\">Escapes most</th></tr></thead>\n<tbody>{rows}</tbody></table></div>\n{}",
+        several(choice)
+    )
+}
+
+/// Where more cameras would have to stand, if one does not tell all.
+fn several(choice: &Choice) -> String {
+    let place = |view: &Scored| {
+        let [azimuth, elevation] = [view.placing.azimuth, view.placing.elevation].map(|v| number(v.to_degrees(), 1));
+        format!("azimuth {azimuth}°, elevation {elevation}°, {} mm", number(view.placing.distance, 0))
+    };
+    let places: Vec<String> = choice.several().map(place).collect();
+    if places.is_empty() {
+        return String::new();
+    }
+    format!(
+        "<p>By this prediction no view tells every fault that some view tells. It takes {} cameras, each a station of its own: {}.</p>\n",
+        places.len(),
+        places.join("; ")
+    )
+}
+
+fn weighed(design: &Design, choice: &Choice, weighed: &Weighed) -> String {
+    let view = &choice.table[weighed.view];
+    let weakest = weighed.weakest().filter(|mode| mode.share > 0.0);
+    let weakest =
+        weakest.map(|mode| format!("{} {}", escaped(&design.components[mode.component].name), mode.kind.word()));
+    format!(
+        "<tr><td>{}°</td><td>{}°</td><td>{} mm</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+        number(view.placing.azimuth.to_degrees(), 1),
+        number(view.placing.elevation.to_degrees(), 1),
+        number(view.placing.distance, 0),
+        number(view.score, 2),
+        percent(weighed.worst()),
+        percent(weighed.mean()),
+        weakest.unwrap_or_default()
     )
 }
 

@@ -9,6 +9,7 @@
 //! assembly may stand, and as many of the watched components as possible are seen at all.
 
 use super::blocked;
+use super::escape::{self, Weighed};
 use super::item_buffer::{ItemBuffer, PixelGrid};
 use super::nodes::{Seen, seen_on_grid};
 use crate::assembly::contact::FaceRef;
@@ -69,6 +70,28 @@ pub struct Choice {
     pub seen: Vec<Seen>,
     /// E0601 for every watched component it does not see, E0603 for what stands inside of something.
     pub diagnostics: Vec<Diagnostic>,
+    /// Views that the score put first, with what they are predicted to let pass ([`super::escape`]); none for a camera that
+    /// is fixed, or chosen by the score alone.
+    pub shortlist: Vec<Weighed>,
+    /// The fewest of the views weighed that together tell every fault which any of them tells, the chosen one among them
+    /// (indices into `table`); empty where none was weighed.
+    pub cameras: Vec<usize>,
+}
+
+impl Choice {
+    /// The views of the cameras that together tell every fault, where the chosen one alone does not; else none.
+    pub fn several(&self) -> impl Iterator<Item = &Scored> {
+        let several = if self.cameras.len() > 1 { &self.cameras[..] } else { &[] };
+        several.iter().map(|&view| &self.table[view])
+    }
+
+    /// The shortlist, the chosen view first, then as predicted escape and score order them.
+    pub fn weighed(&self) -> impl Iterator<Item = &Weighed> {
+        let mut order: Vec<&Weighed> = self.shortlist.iter().collect();
+        let is_other = |w: &Weighed| w.view != self.best;
+        order.sort_by(|a, b| is_other(a).cmp(&is_other(b)).then(escape::compare(&self.table, a, b)));
+        order.into_iter()
+    }
 }
 
 /// The faces of the error trees, each once, from the highest level at which they stand
@@ -83,26 +106,32 @@ pub fn targets(levels: &BTreeMap<FaceRef, u32>) -> Vec<Target> {
     levels.iter().map(target).collect()
 }
 
-/// Chooses the station's camera; a fixed one is scored and checked as a choice of one.
+/// Chooses the station's camera by the paper's score alone; a fixed one is scored and checked as a choice of one.
 pub fn choose(design: &Design, station: &Station, bodies: &[Body], targets: &[Target]) -> Choice {
+    let table = paper_table(design, station, bodies, targets);
+    let best = first(&table);
+    chosen(design, station, bodies, table, best)
+}
+
+/// The scores of all views that are tried.
+pub(super) fn paper_table(design: &Design, station: &Station, bodies: &[Body], targets: &[Target]) -> Vec<Scored> {
     let search = Search::new(design, station, bodies, targets);
-    let table = match &station.camera.placing {
+    match &station.camera.placing {
         &CameraPlacing::Fixed { distance, elevation, azimuth } => {
             search.score_all(&[Placed { distance, elevation, azimuth }])
         }
         CameraPlacing::Auto { distance, elevation, azimuth } => search.run([distance, elevation, azimuth]),
-    };
-    chosen(design, station, bodies, table)
+    }
 }
 
 /// A choice made before: the view is scored and checked like a fixed one, and no other is tried.
 pub fn keep(design: &Design, station: &Station, bodies: &[Body], targets: &[Target], placing: Placed) -> Choice {
     let search = Search::new(design, station, bodies, targets);
-    chosen(design, station, bodies, search.score_all(&[placing]))
+    chosen(design, station, bodies, search.score_all(&[placing]), 0)
 }
 
-fn chosen(design: &Design, station: &Station, bodies: &[Body], table: Vec<Scored>) -> Choice {
-    let best = best(&table);
+/// The view `best` of the table as the choice.
+pub(super) fn chosen(design: &Design, station: &Station, bodies: &[Body], table: Vec<Scored>, best: usize) -> Choice {
     let camera = build::camera(&station.camera, table[best].placing);
     let grid = PixelGrid::of(&camera);
     let seen = seen_on_grid(bodies, &camera, &ItemBuffer::on_grid(bodies, &camera, &grid), &grid);
@@ -112,7 +141,7 @@ fn chosen(design: &Design, station: &Station, bodies: &[Body], table: Vec<Scored
         None => unseen(design, station, &table, &seen),
     };
     diagnostics.extend(blocked::lamps(design, station, bodies));
-    Choice { best, table, camera, seen, diagnostics }
+    Choice { best, table, camera, seen, diagnostics, shortlist: Vec::new(), cameras: Vec::new() }
 }
 
 struct Search<'a> {
@@ -143,7 +172,7 @@ impl<'a> Search<'a> {
         let axes = [0, 1, 2].map(|i| Axis::new(ranges[i], COARSE[i], i == 2));
         let mut table = self.score_all(&product(axes.each_ref().map(Axis::coarse)));
         for round in 1..=ROUNDS {
-            let Placed { distance, elevation, azimuth } = table[best(&table)].placing;
+            let Placed { distance, elevation, azimuth } = table[first(&table)].placing;
             let centre = [distance, elevation, azimuth];
             let near = [0, 1, 2].map(|i| axes[i].near(centre[i], 0.5f64.powi(round as i32)));
             let tried = |placing: &Placed| table.iter().any(|scored| scored.placing == *placing);
@@ -226,13 +255,24 @@ fn product([distances, elevations, azimuths]: [Vec<f64>; 3]) -> Vec<Placed> {
 }
 
 /// Index of the best view; the first of equals.
-fn best(table: &[Scored]) -> usize {
+pub(super) fn first(table: &[Scored]) -> usize {
     (1..table.len()).fold(0, |best, i| if compare(&table[i], &table[best]).is_gt() { i } else { best })
 }
 
+/// All views from the best down; of equals the one tried first.
+pub(super) fn ranked(table: &[Scored]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..table.len()).collect();
+    order.sort_by(|&a, &b| compare(&table[b], &table[a]).then(a.cmp(&b)));
+    order
+}
+
 fn compare(a: &Scored, b: &Scored) -> Ordering {
-    let seen = |s: &Scored| s.watched.iter().filter(|&&pixels| pixels >= LEAST_PIXELS).count();
-    a.framed.cmp(&b.framed).then(seen(a).cmp(&seen(b))).then(a.score.total_cmp(&b.score))
+    demands(a).cmp(&demands(b)).then(a.score.total_cmp(&b.score))
+}
+
+/// What comes before the score: whether all that is watched stays inside the image, and how much of it is seen.
+pub(super) fn demands(view: &Scored) -> (bool, usize) {
+    (view.framed, view.watched.iter().filter(|&&pixels| pixels >= LEAST_PIXELS).count())
 }
 
 fn extremes<'a>(station: &Station, bodies: impl Iterator<Item = &'a Body>) -> Vec<Point3<f64>> {

@@ -5,11 +5,14 @@
 
 mod blocked;
 pub mod choose;
+pub mod cover;
+pub mod escape;
 pub mod item_buffer;
 pub mod lock;
 pub mod nodes;
 pub mod picture;
 mod raster;
+mod shade;
 
 #[cfg(test)]
 mod shapes;
