@@ -7,9 +7,10 @@
 use super::calibrate::{Calibration, widened};
 use super::camera::Camera;
 use super::density::Density;
-use super::judge::{Evidence, Look, NodeImages, Prepared};
+use super::judge::{Evidence, NodeImages, Prepared};
 use super::light::Light;
 use super::locate::{Located, Search};
+use super::look::Look;
 use super::model::{Model, Node};
 use super::photo::Photo;
 use super::pose::Pose;
@@ -206,19 +207,24 @@ impl<'a> Inspector<'a> {
     /// Log-likelihoods of all nodes.
     pub fn evidence(&self, photo: &Photo, pose: &Pose) -> Vec<Evidence> {
         let looks = self.looks(photo, pose);
-        let nodes = || self.prepared.nodes.iter().zip(&looks).zip(&self.densities);
-        let shifts: Vec<[f64; 2]> = nodes().map(|((node, look), d)| node.shift(&d[0], look)).collect();
-        let own = |(i, ((node, look), densities)): (usize, ((&NodeImages, &Look), &Vec<Density>))| {
+        let factor = |node: usize| f64::from(self.prepared.nodes[node].window.frame.factor);
+        let shift = |(i, look): (usize, &Look)| look.best_shift().map(|v| v * factor(i));
+        let shifts: Vec<[f64; 2]> = looks.iter().enumerate().map(shift).collect();
+        let own = |(i, look): (usize, &Look)| {
             let expected = self.expected.as_ref().map(|all| settle::in_photo(all, &shifts, i));
-            node.evidence(&densities[..node.own], look, expected.as_ref())
+            self.prepared.nodes[i].evidence(look, expected.as_ref())
         };
-        nodes().enumerate().map(own).collect()
+        looks.iter().enumerate().map(own).collect()
     }
 
-    fn looks(&self, photo: &Photo, pose: &Pose) -> Vec<Look> {
+    /// Every node at a pose under its own hypotheses.
+    fn looks(&self, photo: &Photo, pose: &Pose) -> Vec<Look<'_>> {
         let pyramid = self.prepared.pyramid(&photo.light);
-        let look = |node: &NodeImages| node.look(&self.light, pyramid.at(node.window.frame.factor), &self.camera, pose);
-        self.prepared.nodes.iter().map(look).collect()
+        let look = |(i, node): (usize, &NodeImages)| {
+            let reduced = pyramid.at(node.window.frame.factor);
+            node.look(&self.densities[i][..node.own], &self.light, reduced, &self.camera, pose)
+        };
+        self.prepared.nodes.iter().enumerate().map(look).collect()
     }
 
     /// Log-likelihoods of the disturbed states of the nodes that need an explanation; empty for the others.
@@ -227,12 +233,14 @@ impl<'a> Inspector<'a> {
         if nodes.iter().filter(|n| n.faulty).count() < 2 {
             return vec![Vec::new(); nodes.len()];
         }
-        let looks = self.looks(photo, pose);
+        let pyramid = self.prepared.pyramid(&photo.light);
         let states = |i: usize| {
             let node = &self.prepared.nodes[i];
-            node.evidence(&self.densities[i][node.own..], &looks[i], None)
+            let densities = &self.densities[i][node.own..];
+            let reduced = pyramid.at(node.window.frame.factor);
+            node.evidence(&node.look(densities, &self.light, reduced, &self.camera, pose), None).log_likelihoods
         };
-        (0..nodes.len()).map(|i| if needed(i) { states(i).log_likelihoods } else { Vec::new() }).collect()
+        (0..nodes.len()).map(|i| if needed(i) { states(i) } else { Vec::new() }).collect()
     }
 
     fn report(&self, index: usize, evidence: &Evidence, pose: &Pose) -> NodeReport {

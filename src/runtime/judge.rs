@@ -6,17 +6,12 @@ use super::camera::Camera;
 use super::density::{Density, Floor, mean_of};
 use super::grid::Grid;
 use super::light::{Light, LightEvidence};
+use super::look::{Look, Shifted};
 use super::model::{Image, Model, Node};
 use super::pose::Pose;
 use super::settle::Expected;
-use super::window::{Frame, Placed, Stencil, Window, mask_of};
+use super::window::{Frame, Stencil, Window, mask_of};
 
-/// Local search: shifts of up to this many standard deviations of the node's place, and at most so many px of the photo,
-/// each way. More would let a part that stands too high pass as one that stands a little further back.
-const REACH: f64 = 2.0;
-const LARGEST_REACH: f64 = 12.0;
-/// Shifts that Gaussian noise likes best, among which Student's decides.
-const SHORT_LIST: usize = 4;
 /// Coefficients overlap, and what a model gets wrong it gets wrong along whole edges: a node's count for this many independent
 /// ones beside the evidence of its place. Measured as the scatter of good photos' log-likelihoods.
 const INDEPENDENT: f64 = 100.0;
@@ -136,42 +131,6 @@ pub struct Evidence {
     pub strangeness: f64,
 }
 
-/// A node's coefficients at one shift (node px), with the shift's log prior.
-pub struct Shifted {
-    prior: f64,
-    shift: [f64; 2],
-    coefficients: Vec<f32>,
-}
-
-/// A node in a photo, at every shift of the local search.
-pub struct Look {
-    shifted: Vec<Shifted>,
-    inside: f64,
-}
-
-/// Log-likelihood and index of the shift at which a density fits best.
-fn likeliest(density: &Density, shifted: &[Shifted], prior: &dyn Fn(&Shifted) -> f64) -> (f64, usize) {
-    let mut quick: Vec<(f64, usize)> =
-        shifted.iter().enumerate().map(|(i, s)| (density.gaussian(&s.coefficients) + prior(s), i)).collect();
-    quick.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let robust = |&(_, i): &(f64, usize)| (density.student(&shifted[i].coefficients) + prior(&shifted[i]), i);
-    let listed = quick.iter().take(SHORT_LIST).map(robust);
-    listed.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))).unwrap_or((f64::NEG_INFINITY, 0))
-}
-
-/// Shifts along one axis (node px) for a standard deviation in node px: half px of the photo where they are few, half
-/// px of the node where they are many.
-fn steps(spread: f64, factor: u32) -> Vec<f64> {
-    /// A reach of more px than this is searched coarsely.
-    const FEW: f64 = 2.0;
-    const FINE_STEP: f64 = 0.5;
-    let px = f64::from(factor);
-    let reach = (REACH * spread * px).min(LARGEST_REACH).round().max(FEW);
-    let step = if reach <= FEW { FINE_STEP } else { (px / 2.0).max(1.0) };
-    let count = (reach / step).round() as i32;
-    (-count..=count).map(|i| f64::from(i) * step / px).collect()
-}
-
 /// What lies outside a mask; everything where nothing does.
 fn surroundings(mask: &[Vec<bool>]) -> Vec<bool> {
     let outside: Vec<bool> = mask.iter().flatten().map(|m| !m).collect();
@@ -197,35 +156,35 @@ impl Pyramid {
 }
 
 impl NodeImages {
-    /// The node in a photo at a pose.
-    pub fn look(&self, light: &Light, reduced: &Grid, camera: &Camera, pose: &Pose) -> Look {
+    /// The node in a photo at a pose, ready to be weighed under some densities (at least one).
+    pub fn look<'a>(
+        &self,
+        densities: &'a [Density],
+        light: &Light,
+        reduced: &Grid,
+        camera: &Camera,
+        pose: &Pose,
+    ) -> Look<'a> {
         let placed = self.window.place(camera, pose);
         let inside = self.window.cut(reduced, &placed, [0.0, 0.0]).1;
-        Look { shifted: self.shifted(reduced, &placed, light), inside }
-    }
-
-    /// The shift (px of the photo) at which a density fits best.
-    pub fn shift(&self, density: &Density, look: &Look) -> [f64; 2] {
-        let factor = f64::from(self.window.frame.factor);
-        look.shifted[likeliest(density, &look.shifted, &|s| s.prior).1].shift.map(|v| v * factor)
-    }
-
-    /// Evidence for each of some densities (at least one); each re-aligns by itself within the local search. The first one's
-    /// place is known as well as `expected` says.
-    pub fn evidence(&self, densities: &[Density], look: &Look, expected: Option<&Expected>) -> Evidence {
-        let factor = f64::from(self.window.frame.factor);
-        let weight = (self.stencil.len() as f64 / INDEPENDENT).max(1.0);
-        let prior = |s: &Shifted, at: [f64; 2], spread: [f64; 2]| -> f64 {
-            (0..2).map(|k| -0.5 * ((s.shift[k] * factor - at[k]) / spread[k]).powi(2)).sum()
+        let coefficients = |shift: [f64; 2]| {
+            let (image, _) = self.window.cut(reduced, &placed, shift);
+            self.stencil.coefficients(&light.level(image, &self.surroundings))
         };
-        let free =
-            |s: &Shifted| expected.map_or(s.prior, |e| prior(s, e.at, self.spread.map(|spread| spread * factor)));
-        let held = |s: &Shifted| expected.map_or(s.prior, |e| weight * prior(s, e.at, e.spread));
-        let (first, others) = densities.split_first().expect("a node has a good state");
-        let good = likeliest(first, &look.shifted, &held);
-        let others = others.iter().map(|density| likeliest(density, &look.shifted, &free).0);
-        let Shifted { shift, ref coefficients, .. } = look.shifted[good.1];
-        let strangeness = self.stencil.highest_mean(&first.surprise(coefficients)).unwrap_or(0.0);
+        Look::new(densities, self.spread, self.window.frame.factor, inside, &coefficients)
+    }
+
+    /// Evidence for each density of a look; each re-aligns by itself within the local search. The first one's place is known as
+    /// well as `expected` says.
+    pub fn evidence(&self, look: &Look, expected: Option<&Expected>) -> Evidence {
+        let weight = (self.stencil.len() as f64 / INDEPENDENT).max(1.0);
+        let spread = self.spread.map(|s| s * f64::from(self.window.frame.factor));
+        let at = expected.map_or([0.0; 2], |e| e.at);
+        let free = Expected { at, spread };
+        let good = expected.map_or_else(|| look.likeliest(0, &free, 1.0), |e| look.likeliest(0, e, weight));
+        let others = (1..look.densities.len()).map(|density| look.likeliest(density, &free, 1.0).0);
+        let Shifted { shift, ref coefficients } = look.shifted[good.1];
+        let strangeness = self.stencil.highest_mean(&look.densities[0].surprise(coefficients)).unwrap_or(0.0);
         let log_likelihoods = std::iter::once(good.0).chain(others).collect();
         Evidence { log_likelihoods, inside: look.inside, shift, strangeness }
     }
@@ -239,28 +198,10 @@ impl NodeImages {
         camera: &Camera,
         pose: &Pose,
     ) -> [f64; 2] {
-        let placed = self.window.place(camera, pose);
-        let shifted = self.shifted(reduced, &placed, light);
-        shifted[likeliest(density, &shifted, &|s| s.prior).1].shift
+        self.look(std::slice::from_ref(density), light, reduced, camera, pose).best_shift()
     }
 
-    /// The node at every shift of the local search.
-    fn shifted(&self, reduced: &Grid, placed: &Placed, light: &Light) -> Vec<Shifted> {
-        let [columns, rows] = self.spread.map(|spread| steps(spread, self.window.frame.factor));
-        let mut out = Vec::new();
-        for &y in &rows {
-            for &x in &columns {
-                let shift = [x, y];
-                let prior: f64 = (0..2).map(|k| -0.5 * (shift[k] / self.spread[k]).powi(2)).sum();
-                let (image, _) = self.window.cut(reduced, placed, shift);
-                let image = light.level(image, &self.surroundings);
-                out.push(Shifted { prior, shift, coefficients: self.stencil.coefficients(&image) });
-            }
-        }
-        out
-    }
-
-    /// The node's window in a photo of a correct assembly, at its most likely shift.
+    /// The node's window in a photo of a correct assembly at its most likely shift, and the shift in px of the photo.
     pub fn reference(
         &self,
         light: &Light,

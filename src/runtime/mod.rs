@@ -15,6 +15,7 @@ pub mod judge;
 pub mod light;
 pub mod linear;
 pub mod locate;
+mod look;
 pub mod model;
 pub mod photo;
 pub mod pose;
