@@ -48,7 +48,7 @@ fn read(text: &str, name: &str, tables: &Tables) -> Result<Value, String> {
     let value = ron_value::parse(opened(text)?)?;
     check(&value, name, tables, name)?;
     match value.at("format") {
-        Value::Int(2) => Ok(value),
+        Value::Int(3) => Ok(value),
         other => Err(format!("format {other:?}")),
     }
 }
@@ -145,6 +145,8 @@ fn a_reader_written_from_the_page_reads_what_the_library_reads() {
     assert_eq!(value.at("noise").float(), calibration.noise);
     assert_eq!(value.at("installation").at("turn").floats(), calibration.installation.turn);
     assert_eq!(value.at("poses").items()[0].at("rz").float(), calibration.poses[0].rz);
+    let shifts = value.at("references").items()[0].at("shifts").items();
+    assert_eq!(shifts.iter().map(Value::floats).collect::<Vec<_>>(), calibration.references[0].shifts);
     for (i, window) in value.at("references").items()[0].at("windows").items().iter().enumerate() {
         let grid = calibration.references[0].window(i);
         let light = |r: &Value| row(r.text()).unwrap().into_iter().map(|v| f32::from(v) / 4000.0).collect::<Vec<_>>();
@@ -185,6 +187,7 @@ fn same_model(value: &Value, model: &Model) {
         assert_eq!(node.at("hypotheses").items().len(), own.hypotheses.len());
         for (hypothesis, own) in node.at("hypotheses").items().iter().zip(&own.hypotheses) {
             assert_eq!(hypothesis.at("fault").text(), own.fault);
+            assert_eq!(hypothesis.at("threshold").float(), own.threshold);
             for (k, (image, own)) in hypothesis.at("images").items().iter().zip(&own.images).enumerate() {
                 let lamps = model.station.lamps.len() as i64;
                 let place = (image.at("draw").int(), image.at("lamp").int());
