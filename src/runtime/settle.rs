@@ -42,14 +42,14 @@ pub fn in_photo(expected: &[Expected], shifts: &[[f64; 2]], node: usize) -> Expe
     if expected.len() <= LEAST_OTHERS {
         return out;
     }
-    for k in 0..2 {
-        let others = (0..expected.len()).filter(|&i| i != node);
-        let off: Vec<f32> = others.map(|i| (shifts[i][k] - expected[i].at[k]) as f32).collect();
+    let others: Vec<usize> = (0..expected.len()).filter(|&i| i != node).collect();
+    for (axis, at) in out.at.iter_mut().enumerate() {
+        let off: Vec<f32> = others.iter().map(|&i| (shifts[i][axis] - expected[i].at[axis]) as f32).collect();
         let common = linear::median(&mut off.clone());
         let apart = linear::median(&mut off.iter().map(|o| (o - common).abs()).collect::<Vec<_>>());
-        out.at[k] += f64::from(common);
+        *at += f64::from(common);
         // The median distance of a normal variable from its mean is 0.6745 standard deviations.
-        out.spread[k] = out.spread[k].hypot(f64::from(apart) / 0.6745);
+        out.spread[axis] = out.spread[axis].hypot(f64::from(apart) / 0.6745);
     }
     out
 }
