@@ -14,7 +14,7 @@ use super::window::{Frame, Stencil, Window, mask_of};
 
 /// Coefficients overlap, and what a model gets wrong it gets wrong along whole edges: a node's count for this many independent
 /// ones beside the evidence of its place. Measured as the scatter of good photos' log-likelihoods.
-const INDEPENDENT: f64 = 100.0;
+pub const INDEPENDENT: f64 = 100.0;
 /// Photo values from here on count as clipped.
 pub const CLIP: f32 = 0.98;
 

@@ -38,10 +38,10 @@ use std::collections::BTreeMap;
 use synthesise::{Draws, Shots, synthesise};
 
 /// Customers imagined for the held-out renders.
-const CUSTOMERS: u64 = 2;
+const CUSTOMERS: u64 = 6;
 /// Held-out draws of good assemblies per customer, the first of which calibrates, and of every error mode.
-const HELD_OUT_GOOD: u32 = 13;
-const HELD_OUT_FAULTY: u32 = 5;
+const HELD_OUT_GOOD: u32 = 6;
+const HELD_OUT_FAULTY: u32 = 2;
 /// Bright matt surfaces reach this grey value (share of full scale) under the described lamps.
 const EXPOSED_TO: f64 = 0.6;
 const EXPOSED_QUANTILE: f64 = 0.95;

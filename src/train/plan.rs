@@ -35,6 +35,8 @@ const HIDES: f64 = 0.5;
 const SMALLEST_ACROSS: u32 = 8;
 /// Coarsest resolution of the shots.
 const COARSEST: u32 = 4;
+/// As long as the assembly's box has no more px of the shots than this, finer ones cost little and show smaller faults.
+const AFFORDABLE: u32 = 60_000;
 
 /// One node to be trained.
 pub struct NodePlan {
@@ -144,13 +146,19 @@ fn seen(drawn: &Drawn, faults: &[(&ErrorMode, [f64; 3])], camera: &Camera) -> It
     ItemBuffer::of(&bodies(&drawn.instance(faults), drawn.standing.to_array()), camera)
 }
 
-/// The resolution at which the smallest watched component still has enough pixels across.
+/// The finest resolution that is affordable, or a finer one at which the smallest watched component has enough pixels across.
 fn resolution(design: &Design, camera: &Camera, nominal: &Drawn) -> u32 {
     let full = seen(nominal, &[], camera);
     let across = |w: &crate::design::model::Watch| full.bbox(w.component).map(|b| (b.x1 - b.x0).min(b.y1 - b.y0));
     let smallest = design.inspect.watch.iter().filter_map(across).filter(|&a| a >= SMALLEST_ACROSS).min();
+    let boxes = (0..design.components.len()).filter_map(|c| full.bbox(c));
+    let hull = boxes.reduce(|a, b| a.around(&b));
+    let area = hull.map_or(0, |b| (b.x1 - b.x0) * (b.y1 - b.y0));
     let mut base = 1;
-    while base < COARSEST && smallest.is_some_and(|s| s / (base * 2) >= SMALLEST_ACROSS) {
+    while base < COARSEST
+        && area / (base * base) > AFFORDABLE
+        && smallest.is_some_and(|s| s / (base * 2) >= SMALLEST_ACROSS)
+    {
         base *= 2;
     }
     base

@@ -5,11 +5,14 @@
 
 use super::stats::{normal_quantile, rounded};
 use crate::runtime::inspect;
+use crate::runtime::judge::INDEPENDENT;
 use crate::runtime::model::Node;
 
 /// Share of the lowest goods and the highest faults left out when asking whether they overlap: photos in which the pose
 /// went wrong, which say nothing about the node.
 const TRIM: f64 = 0.1;
+/// Share of a normal variable more than one standard deviation below its mean.
+const ONE_DEVIATION_DOWN: f64 = 0.16;
 
 /// What the held-out renders showed of one node: per render the ratio against each hypothesis.
 pub struct Seen {
@@ -40,24 +43,37 @@ fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
     out
 }
 
-/// The log-likelihood ratio below which a node counts as faulty in one way: its sign decides or, where good and faulty renders
-/// lie apart but below zero, the middle between them; what is more likely good is never rejected. Where their bulk overlaps,
-/// no threshold is right: the promised rate of false rejects is kept by the middle and the spread of the goods, and what
-/// escapes is counted. Never a quantile of the goods: their few lowest scores say nothing about a photo's.
+/// The log-likelihood ratio below which a node counts as faulty in one way. Where good and faulty renders lie apart but below
+/// zero, the middle between them decides. Else its sign does, less what the promised rate of false rejects takes: of good
+/// renders a share `p0` falls below zero, and from there on likelihood ratios fall off as their own size says (a ratio of Λ is
+/// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap the spread of the goods may allow less than that.
+/// Never a quantile of the goods: their few lowest scores say nothing about a photo's.
 fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
     if good.is_empty() || fault.is_empty() {
         return 0.0;
     }
     let (lowest, highest) = (at_share(good, TRIM), at_share(fault, 1.0 - TRIM));
-    if lowest > highest {
-        return if lowest > 0.0 { 0.0 } else { (lowest + highest) / 2.0 };
+    let apart = lowest > highest;
+    if apart && lowest <= 0.0 {
+        return (lowest + highest) / 2.0;
     }
     let middle = at_share(good, 0.5);
+    let below_zero = below_zero(middle, middle - at_share(good, ONE_DEVIATION_DOWN));
+    let by_ratio = -(below_zero / false_reject).ln().max(0.0) / INDEPENDENT;
+    if apart {
+        return by_ratio;
+    }
     let mut distances: Vec<f64> = good.iter().map(|g| (g - middle).abs()).collect();
     distances.sort_by(f64::total_cmp);
     // The median distance of a normal variable from its mean is 0.6745 standard deviations.
     let deviation = at_share(&distances, 0.5) / 0.6745;
-    (middle - normal_quantile(1.0 - false_reject) * deviation).min(0.0)
+    let by_spread = (middle - normal_quantile(1.0 - false_reject) * deviation).min(0.0);
+    by_spread.max(by_ratio)
+}
+
+/// Share of a normal variable below zero, from its mean and its deviation downwards: Chernoff's bound, halved.
+fn below_zero(middle: f64, deviation: f64) -> f64 {
+    if middle <= 0.0 { 0.5 } else { 0.5 * (-0.5 * (middle / deviation.max(f64::MIN_POSITIVE)).powi(2)).exp() }
 }
 
 /// The value below which a share of ascending values lies.
@@ -71,9 +87,19 @@ mod tests {
 
     #[test]
     fn the_sign_decides_where_renders_lie_apart() {
-        let good = [-0.3, 0.2, 0.25, 0.3, 0.3, 0.35, 0.4, 0.4, 0.45, 0.5, 0.6];
+        let good = [0.2, 0.4, 0.42, 0.45, 0.45, 0.45, 0.48, 0.5, 0.5, 0.5, 0.6];
         let fault = [-0.9, -0.8, -0.8, -0.7, -0.6, -0.5, -0.5, -0.4, -0.3, -0.2, 0.1];
         assert_eq!(threshold(&good, &fault, 1e-3), 0.0);
+    }
+
+    /// Goods of mean 0.2 and deviation 0.1 fall below zero in 0.5 e^-2 = 6.8 % of photos; one in a thousand is allowed:
+    /// ln 67.7 = 4.2 in a hundred independent coefficients.
+    #[test]
+    fn goods_near_zero_lower_it_by_what_the_promise_takes() {
+        let good = [0.0, 0.1, 0.1, 0.15, 0.2, 0.2, 0.2, 0.25, 0.3, 0.3, 0.4];
+        let limit = threshold(&good, &[-0.8, -0.7, -0.6, -0.5], 1e-3);
+        assert!((limit + (0.5f64 * (-2.0f64).exp() / 1e-3).ln() / 100.0).abs() < 1e-9, "{limit}");
+        assert!(threshold(&good, &[-0.8, -0.7, -0.6, -0.5], 1e-5) < limit, "a stricter promise costs more");
     }
 
     #[test]
@@ -83,10 +109,12 @@ mod tests {
     }
 
     #[test]
-    fn where_they_overlap_the_false_rejects_are_kept() {
-        let good = [-0.1, -0.05, 0.0, 0.05, 0.1];
-        let fault = [-0.2, -0.1, 0.0, 0.1];
-        let expected = -3.0902 * 0.05 / 0.6745;
-        assert!((threshold(&good, &fault, 1e-3) - expected).abs() < 1e-3);
+    fn where_they_overlap_the_lesser_of_both_allowances_counts() {
+        let narrow = [-0.010, -0.005, 0.0, 0.005, 0.010];
+        let by_spread = -3.0902 * 0.005 / 0.6745;
+        assert!((threshold(&narrow, &[-0.02, -0.01, 0.0, 0.01], 1e-3) - by_spread).abs() < 1e-3);
+        let wide = [-0.1, -0.05, 0.0, 0.05, 0.1];
+        let by_ratio = -(0.5f64 / 1e-3).ln() / 100.0;
+        assert!((threshold(&wide, &[-0.2, -0.1, 0.0, 0.1], 1e-3) - by_ratio).abs() < 1e-9);
     }
 }

@@ -5,6 +5,7 @@
 
 use super::edges;
 use super::plan::Plan;
+use super::shots::Shot;
 use super::stats::{rate, rounded};
 use super::synthesise::{FaultyShot, Shots};
 use super::thresholds;
@@ -42,7 +43,10 @@ const LEAST_POWER: f64 = 0.76;
 /// A station as some customer might have it.
 pub struct Customer {
     pub installation: Installation,
+    /// Before he exposes his camera.
     pub powers: Vec<f64>,
+    /// Grey value (share of full scale) that bright matt surfaces reach in his photos.
+    pub exposure: f64,
     pub noise: f64,
     pub seed: u64,
     /// Share of light that his lens loses in the corners.
@@ -62,19 +66,28 @@ pub fn customer(model: &Model, spec: &CameraSpec, index: u64) -> Customer {
     let turn = [(); 3].map(|()| within(install.angle_rad));
     let focal = within(install.focal_share);
     let k1 = within((install.k1[1] - install.k1[0]) / 2.0);
-    let exposure = stream.between(EXPOSURES[0], EXPOSURES[1]) / 0.6;
-    let powers =
-        model.station.lamps.iter().map(|l| l.power * exposure * stream.between(LAMP_POWERS[0], LAMP_POWERS[1]));
+    let exposure = stream.between(EXPOSURES[0], EXPOSURES[1]);
+    let powers = model.station.lamps.iter().map(|l| l.power * stream.between(LAMP_POWERS[0], LAMP_POWERS[1]));
     let powers = powers.collect();
     let installation = Installation { offset, turn, focal, k1 };
     Customer {
         installation,
         powers,
+        exposure,
         noise: model.station.noise.max(0.002),
         seed: stream.bits(),
         vignetting: spec.vignetting.at(Stream::new(model.seed, "lens", index).uniform()),
         full_well: spec.full_well,
         deepest: f64::from((1_u32 << spec.depth.min(16)) - 1),
+    }
+}
+
+impl Customer {
+    /// Sets his camera's exposure by a shot of an assembly.
+    fn expose(&self, shot: &Shot) -> Customer {
+        let bright = edges::quantile(&shot.lit(&self.powers), |_| true, EXPOSED_QUANTILE).max(f32::MIN_POSITIVE);
+        let gain = self.exposure / f64::from(bright);
+        Customer { powers: self.powers.iter().map(|p| p * gain).collect(), ..*self }
     }
 }
 
@@ -164,8 +177,9 @@ pub fn settle(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: 
 
 /// `None` when the calibration photo does not do.
 pub(super) fn judge(model: &Model, plan: &Plan, customer: &Customer, shots: &Shots) -> Option<Judged> {
-    let take = |lamps: &[Grid], index: u64| photo(model, customer, lamps, plan.base, index);
     let (first, rest) = shots.good.split_first()?;
+    let customer = customer.expose(first);
+    let take = |lamps: &[Grid], index: u64| photo(model, &customer, lamps, plan.base, index);
     let calibration: Calibration = calibrate::fit(model, &[take(&first.lamps, 0)]).ok()?;
     let inspector = Inspector::new(model, &calibration)?;
     let good = rest.par_iter().enumerate().map(|(i, s)| inspector.inspect(&take(&s.lamps, 1 + i as u64))).collect();

@@ -42,7 +42,7 @@ pub struct PixelBox {
 
 impl PixelBox {
     /// The smallest rectangle round both.
-    pub(super) fn around(&self, other: &PixelBox) -> PixelBox {
+    pub(crate) fn around(&self, other: &PixelBox) -> PixelBox {
         PixelBox {
             x0: self.x0.min(other.x0),
             y0: self.y0.min(other.y0),
