@@ -1,19 +1,17 @@
 //! Orientation fields: the direction of every edge of a photo, at one resolution.
 //!
-//! In: a grey image and its noise. Out: gradients and their directions at every pixel corner, from the Haar bands of level 1.
-//! Never knows what it looks for.
+//! In: a grey image and its noise. Out: gradients and their directions at every pixel corner, the Haar bands of level 1. They
+//! are worked out where they are asked for: a search asks for few of them. Never knows what it looks for.
 
 use super::grid::Grid;
-use super::haar::Integral;
 
 /// Gradient directions of a photo at one resolution.
 pub struct Field {
-    width: usize,
-    height: usize,
-    /// Gradient at pixel corners, divided by its length plus the noise level; of unsigned edges at twice its angle.
-    orientation: Vec<[f32; 2]>,
-    /// The gradient itself.
-    gradient: Vec<[f32; 2]>,
+    light: Grid,
+    /// What is added to a gradient's length before it is divided by it: the noise level.
+    floor: f32,
+    /// Orientations averaged over 3 x 3 corners, where the field is smooth.
+    smooth: Option<Vec<[f32; 2]>>,
     unsigned: bool,
 }
 
@@ -31,46 +29,65 @@ pub fn halved([x, y]: [f32; 2]) -> [f32; 2] {
 }
 
 impl Field {
-    /// Orientations of `grid`, whose noise has standard deviation `noise`; `smooth` averages orientations over 3 x 3 px so
+    /// Orientations of `light`, whose noise has standard deviation `noise`; `smooth` averages orientations over 3 x 3 px so
     /// that a coarse grid of poses cannot step over an edge; of `unsigned` edges only the line counts, not its sign.
-    pub fn new(grid: &Grid, noise: f64, smooth: bool, unsigned: bool) -> Field {
-        let (width, height) = (grid.width + 1, grid.height + 1);
-        let integral = Integral::new(grid);
+    pub fn new(light: Grid, noise: f64, smooth: bool, unsigned: bool) -> Field {
         let floor = (3.0 * noise / 2.0).max(1e-6) as f32;
-        let mut gradient = vec![[0.0; 2]; width * height];
-        for y in 1..height - 1 {
-            for x in 1..width - 1 {
-                gradient[y * width + x] = integral.gradient(x, y, 1);
-            }
-        }
-        let unit = |g: &[f32; 2]| {
-            let length = (g[0] * g[0] + g[1] * g[1]).sqrt() + floor;
-            let unit = [g[0] / length, g[1] / length];
-            if unsigned { doubled(unit) } else { unit }
-        };
-        let mut orientation: Vec<[f32; 2]> = gradient.iter().map(unit).collect();
+        let mut field = Field { light, floor, smooth: None, unsigned };
         if smooth {
-            orientation = smoothed(&orientation, width, height);
+            let (width, height) = (field.width(), field.height());
+            let all: Vec<[f32; 2]> = (0..width * height).map(|i| field.sharp(i % width, i / width)).collect();
+            field.smooth = Some(smoothed(&all, width, height));
         }
-        Field { width, height, orientation, gradient, unsigned }
+        field
+    }
+
+    /// Number of pixel corners in a row.
+    fn width(&self) -> usize {
+        self.light.width + 1
+    }
+
+    fn height(&self) -> usize {
+        self.light.height + 1
+    }
+
+    /// H and V of the cell of side 2 round a pixel corner; zero on the border.
+    fn gradient(&self, x: usize, y: usize) -> [f32; 2] {
+        if x == 0 || y == 0 || x >= self.light.width || y >= self.light.height {
+            return [0.0; 2];
+        }
+        let k = (y - 1) * self.light.width + x - 1;
+        let (above, below) = (&self.light.values[k..k + 2], &self.light.values[k + self.light.width..][..2]);
+        let (falling, rising) = (below[1] - above[0], above[1] - below[0]);
+        [0.25 * (falling + rising), 0.25 * (falling - rising)]
+    }
+
+    /// Gradient at a corner, divided by its length plus the noise level; of unsigned edges at twice its angle.
+    fn sharp(&self, x: usize, y: usize) -> [f32; 2] {
+        let g = self.gradient(x, y);
+        let length = (g[0] * g[0] + g[1] * g[1]).sqrt() + self.floor;
+        let unit = [g[0] / length, g[1] / length];
+        if self.unsigned { doubled(unit) } else { unit }
+    }
+
+    /// The corner nearest to a point (field px); `None` outside the image.
+    fn nearest(&self, at: [f64; 2]) -> Option<[usize; 2]> {
+        let (x, y) = (at[0] + 0.5, at[1] + 0.5);
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width() as f64 && y < self.height() as f64;
+        inside.then_some([x as usize, y as usize])
     }
 
     /// Agreement of a unit direction with the orientation at a point (field px); 0 outside the image.
     pub(super) fn agreement(&self, at: [f64; 2], direction: [f32; 2]) -> f32 {
-        let (x, y) = (at[0] + 0.5, at[1] + 0.5);
-        if x < 0.0 || y < 0.0 || x >= self.width as f64 || y >= self.height as f64 {
-            return 0.0;
-        }
-        let o = self.orientation[y as usize * self.width + x as usize];
+        let Some([x, y]) = self.nearest(at) else { return 0.0 };
+        let o = self.smooth.as_ref().map_or_else(|| self.sharp(x, y), |all| all[y * self.width() + x]);
         let direction = if self.unsigned { doubled(direction) } else { direction };
         o[0] * direction[0] + o[1] * direction[1]
     }
 
     /// Gradient at the pixel corner nearest to a point; `None` outside.
     pub fn gradient_at(&self, at: [f64; 2]) -> Option<[f32; 2]> {
-        let (x, y) = (at[0] + 0.5, at[1] + 0.5);
-        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
-        inside.then(|| self.gradient[y as usize * self.width + x as usize])
+        self.nearest(at).map(|[x, y]| self.gradient(x, y))
     }
 
     /// Distance along the normal to the steepest edge of the right polarity within reach, sub-pixel, and its agreement.
@@ -96,18 +113,20 @@ impl Field {
     /// Gradient across an edge, bilinear, without its sign where edges have none; `None` outside.
     pub(super) fn slope(&self, at: [f64; 2], direction: [f32; 2]) -> Option<f32> {
         let (x, y) = (at[0], at[1]);
-        if !(x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64) {
+        if !(x >= 0.0 && y >= 0.0 && x < self.light.width as f64 && y < self.light.height as f64) {
             return None;
         }
         let (i, j) = (x as usize, y as usize);
         let (fx, fy) = ((x - i as f64) as f32, (y - j as f64) as f32);
-        let across = |k: usize| {
-            let g = self.gradient[k];
+        let across = |x: usize, y: usize| {
+            let g = self.gradient(x, y);
             g[0] * direction[0] + g[1] * direction[1]
         };
-        let k = j * self.width + i;
-        let top = across(k) + (across(k + 1) - across(k)) * fx;
-        let bottom = across(k + self.width) + (across(k + self.width + 1) - across(k + self.width)) * fx;
+        let along = |y: usize| {
+            let left = across(i, y);
+            left + (across(i + 1, y) - left) * fx
+        };
+        let (top, bottom) = (along(j), along(j + 1));
         let slope = top + (bottom - top) * fy;
         Some(if self.unsigned { slope.abs() } else { slope })
     }

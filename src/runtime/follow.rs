@@ -12,7 +12,6 @@ use super::pose::Pose;
 /// Search along the edge normal in the fine field's px: first and last reach.
 const FIRST_REACH: f64 = 3.0;
 const LAST_REACH: f64 = 1.25;
-const ROUNDS: usize = 9;
 /// Scale of the robust weight on the distance to an edge (fine px).
 const ROBUST_SCALE: f64 = 0.5;
 /// Standard deviation of one edge point's position (fine px): measurement noise of the calibration's least squares.
@@ -70,12 +69,17 @@ impl View<'_> {
     }
 }
 
-/// Gauss and Newton with priors: parameters begin at `start` and are pulled back to 0 with their `spread`.
-pub(super) fn follow(start: Vec<f64>, spread: &[f64], pulls: impl Fn(&[f64], f64) -> Vec<Pull>) -> Vec<f64> {
+/// Gauss and Newton with priors: `rounds` steps from `start`, pulled back to 0 with their `spread`.
+pub(super) fn follow(
+    start: Vec<f64>,
+    spread: &[f64],
+    rounds: usize,
+    pulls: impl Fn(&[f64], f64) -> Vec<Pull>,
+) -> Vec<f64> {
     let n = spread.len();
     let mut parameters = start;
-    for round in 0..ROUNDS {
-        let t = round as f64 / (ROUNDS - 1) as f64;
+    for round in 0..rounds {
+        let t = round as f64 / rounds.saturating_sub(1).max(1) as f64;
         let pulls = pulls(&parameters, FIRST_REACH + (LAST_REACH - FIRST_REACH) * t);
         let mut a = vec![0.0; n * n];
         let mut b = vec![0.0; n];

@@ -12,8 +12,13 @@ use super::grid::Grid;
 use super::model::{Locator, PointGroup};
 use super::pose::{Installation, Pose};
 
-/// How many coarse poses are refined.
+/// How many coarse poses are followed, quickly, and how many of them to the end.
 const BEAM: usize = 12;
+const FINALISTS: usize = 3;
+/// A first look at a pose of the grid asks one point in so many; one pose in so many is looked at again, or at least so many.
+const FIRST_LOOK: usize = 4;
+const KEPT_OF: usize = 8;
+const LEAST_KEPT: usize = 500;
 /// A coarse step moves edge points by at most this many coarse px.
 const COARSE_STEP_PX: f64 = 1.0;
 
@@ -81,6 +86,16 @@ pub struct Fields {
     finer: Vec<(u32, Field)>,
 }
 
+/// How thoroughly edges are followed: steps, and one edge point in so many.
+#[derive(Clone, Copy)]
+struct Effort {
+    rounds: usize,
+    stride: usize,
+}
+
+const QUICK: Effort = Effort { rounds: 4, stride: 4 };
+const FULL: Effort = Effort { rounds: 9, stride: 1 };
+
 impl Search {
     pub fn new(locator: &Locator) -> Search {
         Search::without(locator, None)
@@ -109,7 +124,7 @@ impl Search {
     /// Orientation fields of a photo whose pixels have noise `noise`.
     pub fn fields(&self, photo: &Grid, noise: f64) -> Fields {
         let field = |factor: u32, smooth| {
-            Field::new(&photo.reduced(factor as usize), noise / f64::from(factor), smooth, self.unsigned)
+            Field::new(photo.reduced(factor as usize), noise / f64::from(factor), smooth, self.unsigned)
         };
         let pixels = |factor: u32| (photo.width / factor as usize) * (photo.height / factor as usize);
         let halves = std::iter::successors(Some(self.fine_factor / 2), |f| Some(f / 2));
@@ -121,34 +136,39 @@ impl Search {
     pub fn locate(&self, fields: &Fields, camera: &Camera, standing: &[[f64; 2]; 4]) -> Option<Located> {
         let candidates = self.coarse(fields, &camera.reduced(self.coarse_factor), standing);
         let fine = camera.reduced(self.fine_factor);
-        let refined = candidates.into_iter().map(|pose| {
-            let pose = self.refine(&fields.fine, &fine, pose, standing);
+        let followed = |pose: Pose, effort: Effort| {
+            let pose = self.refine(&fields.fine, &fine, pose, standing, effort);
             Located { pose, score: self.score(&fields.fine, &fine, &pose) }
-        });
-        let found = refined.max_by(|a, b| a.score.total_cmp(&b.score))?;
-        let finer = |pose, (factor, field): &(u32, Field)| self.refine(field, &camera.reduced(*factor), pose, standing);
+        };
+        let mut quick: Vec<Located> = candidates.into_iter().map(|pose| followed(pose, QUICK)).collect();
+        quick.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let finalists = quick.into_iter().take(FINALISTS).map(|found| followed(found.pose, FULL));
+        let found = finalists.max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let finer =
+            |pose, (factor, field): &(u32, Field)| self.refine(field, &camera.reduced(*factor), pose, standing, FULL);
         Some(Located { pose: fields.finer.iter().fold(found.pose, finer), ..found })
     }
 
     /// The best poses of the grid, one per neighbourhood, best first.
     fn coarse(&self, fields: &Fields, camera: &Camera, standing: &[[f64; 2]; 4]) -> Vec<Pose> {
         let axes = self.grid(camera, standing);
+        let mut promising = self.promising(fields, camera, &axes);
+        // Sheet after sheet, so that each is made once.
+        promising.sort_by_key(|&(_, [k, l, i, j])| [l, k, i, j]);
         let mut scored = Vec::new();
-        for &rz in &axes[3] {
-            for &z in &axes[2] {
-                let sheet = self.sheet(camera, z, rz, &axes);
-                for (i, &x) in axes[0].iter().enumerate() {
-                    for (j, &y) in axes[1].iter().enumerate() {
-                        let score = sheet.score(&fields.coarse, x - axes[0][0], y - axes[1][0]);
-                        scored.push((score, Pose { x, y, z, rz }, [i, j]));
-                    }
-                }
+        for some in promising.chunk_by(|a, b| a.1[..2] == b.1[..2]) {
+            let [k, l, ..] = some[0].1;
+            let sheet = self.sheet(camera, axes[2][k], axes[3][l], &axes);
+            for &(_, [_, _, i, j]) in some {
+                let (x, y) = (axes[0][i], axes[1][j]);
+                let score = sheet.score(&fields.coarse, x - axes[0][0], y - axes[1][0], 1);
+                scored.push((score, Pose { x, y, z: axes[2][k], rz: axes[3][l] }));
             }
         }
         scored.sort_by(|a, b| b.0.total_cmp(&a.0));
         let step = axes.each_ref().map(|a| if a.len() > 1 { a[1] - a[0] } else { 1.0 });
         let mut kept: Vec<Pose> = Vec::new();
-        for (_, pose, _) in scored {
+        for (_, pose) in scored {
             let near = |k: &Pose| {
                 let (a, b) = (k.to_array(), pose.to_array());
                 (0..4).all(|i| (a[i] - b[i]).abs() < 1.5 * step[i])
@@ -161,6 +181,26 @@ impl Search {
             }
         }
         kept
+    }
+
+    /// The poses of the grid (indices of z, rz, x, y) that score best by a few of their points.
+    fn promising(&self, fields: &Fields, camera: &Camera, axes: &[Vec<f64>; 4]) -> Vec<(f64, [usize; 4])> {
+        let mut scored = Vec::new();
+        for (l, &rz) in axes[3].iter().enumerate() {
+            for (k, &z) in axes[2].iter().enumerate() {
+                let sheet = self.sheet(camera, z, rz, axes);
+                for (i, &x) in axes[0].iter().enumerate() {
+                    for (j, &y) in axes[1].iter().enumerate() {
+                        let score = sheet.score(&fields.coarse, x - axes[0][0], y - axes[1][0], FIRST_LOOK);
+                        scored.push((score, [k, l, i, j]));
+                    }
+                }
+            }
+        }
+        let most = (scored.len() / KEPT_OF).max(LEAST_KEPT);
+        scored.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        scored.truncate(most);
+        scored
     }
 
     /// Grid values along each axis, so fine that no edge point moves more than a coarse step.
@@ -239,7 +279,7 @@ impl Search {
     }
 
     /// Follows the edges from `pose` by robust least squares over the axes that may vary.
-    fn refine(&self, field: &Field, camera: &Camera, pose: Pose, standing: &[[f64; 2]; 4]) -> Pose {
+    fn refine(&self, field: &Field, camera: &Camera, pose: Pose, standing: &[[f64; 2]; 4], effort: Effort) -> Pose {
         let free: Vec<usize> = (0..4).filter(|&i| standing[i][1] - standing[i][0] > 1e-9).collect();
         let spread = free.iter().map(|&i| (standing[i][1] - standing[i][0]) * 10.0).collect::<Vec<_>>();
         let with = |parameters: &[f64]| {
@@ -248,9 +288,9 @@ impl Search {
             Pose::from_array(array)
         };
         let view = View { field, camera };
-        let parameters = follow(vec![0.0; free.len()], &spread, |parameters, reach| {
+        let parameters = follow(vec![0.0; free.len()], &spread, effort.rounds, |parameters, reach| {
             let pose = with(parameters);
-            let points = self.chosen(field, camera, &pose);
+            let points: Vec<EdgePoint> = self.chosen(field, camera, &pose).into_iter().step_by(effort.stride).collect();
             view.pulls(&points, reach, parameters, |p, point| camera.project(with(p).apply(point.at)), &pose, camera)
         });
         let mut array = with(&parameters).to_array();
@@ -285,7 +325,7 @@ impl Search {
             (Installation::from_array(eight), Pose::from_array(array))
         };
         let at_level = |start: Vec<f64>, factor: u32, field: &dyn Fn(&Fields) -> &Field| {
-            follow(start, &spreads, |parameters, reach| {
+            follow(start, &spreads, FULL.rounds, |parameters, reach| {
                 let mut all = Vec::new();
                 for (photo, fields) in fields.iter().enumerate() {
                     let (installation, pose) = split(parameters, photo);
@@ -323,12 +363,15 @@ struct SheetPoint {
 
 impl Sheet {
     /// Sum over groups of the best alternative's agreement.
-    fn score(&self, field: &Field, dx: f64, dy: f64) -> f64 {
+    /// Only every `stride`-th point is asked.
+    fn score(&self, field: &Field, dx: f64, dy: f64, stride: usize) -> f64 {
         let sum = |points: &Vec<SheetPoint>| {
+            let points = points.iter().step_by(stride);
             let agreement = |p: &SheetPoint| {
                 field.agreement([0, 1].map(|i| p.at[i] + dx * p.per_x[i] + dy * p.per_y[i]), p.direction)
             };
-            (f64::from(points.iter().map(agreement).sum::<f32>()), points.len())
+            let count = points.len();
+            (f64::from(points.map(agreement).sum::<f32>()), count)
         };
         self.groups.iter().map(|alternatives| best_of(alternatives.iter().map(sum))).sum()
     }

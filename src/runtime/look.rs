@@ -5,7 +5,8 @@
 
 use super::density::Density;
 use super::settle::Expected;
-use std::collections::BTreeSet;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 
 /// Local search: shifts of up to this many standard deviations of the node's place, and at most so many px of the photo,
 /// each way. More would let a part that stands too high pass as one that stands a little further back.
@@ -25,8 +26,10 @@ pub(super) struct Shifted {
 pub struct Look<'a> {
     pub(super) densities: &'a [Density],
     pub(super) shifted: Vec<Shifted>,
-    /// Per density, its Gaussian log-likelihood at every shift.
-    fits: Vec<Vec<f64>>,
+    /// Per density, shifts with its Gaussian log-likelihood there.
+    fits: Vec<Vec<(usize, f64)>>,
+    /// Per density and shift its log-likelihood under Student's noise, as far as it was asked for.
+    robust: RefCell<BTreeMap<(usize, usize), f64>>,
     /// Share of the window inside the photo.
     pub(super) inside: f64,
     /// Standard deviation of the place before anything is known of this photo's station (px of the photo).
@@ -45,41 +48,50 @@ impl<'a> Look<'a> {
     ) -> Look<'a> {
         let factor = f64::from(factor);
         let spread = spread.map(|s| s * factor);
-        let fits = vec![Vec::new(); densities.len()];
-        let mut look = Look { densities, shifted: Vec::new(), fits, inside, spread, factor };
         let [columns, rows] = spread.map(|spread| steps(spread, factor));
-        for &y in &rows {
-            for &x in &columns {
-                look.add([x, y].map(|v| f64::from(v) / 2.0), coefficients);
-            }
+        let whole = rows.iter().flat_map(|&y| columns.iter().map(move |&x| [x, y]));
+        let shifted = whole.map(|halves| seen(halves, factor, coefficients)).collect();
+        let fits = vec![Vec::new(); densities.len()];
+        let robust = RefCell::default();
+        let mut look = Look { densities, shifted, fits, robust, inside, spread, factor };
+        // One density at a time: it is read again and again and should stay near.
+        for density in 0..densities.len() {
+            (0..look.shifted.len()).for_each(|i| look.fit(density, i));
         }
-        let halves: BTreeSet<[i32; 2]> = if spread.iter().all(|s| reach(*s) <= FEW) {
-            (0..densities.len()).flat_map(|density| look.round_best(density)).collect()
-        } else {
-            BTreeSet::new()
-        };
-        for half in halves {
-            look.add(half.map(|v| f64::from(v) / 2.0), coefficients);
+        if spread.iter().all(|s| reach(*s) <= FEW) {
+            look.closer(coefficients);
         }
         look
     }
 
-    /// Takes in a shift (px of the photo).
-    fn add(&mut self, at: [f64; 2], coefficients: &dyn Fn([f64; 2]) -> Vec<f32>) {
-        let shift = at.map(|v| v / self.factor);
-        let coefficients = coefficients(shift);
-        for (fits, density) in self.fits.iter_mut().zip(self.densities) {
-            fits.push(density.gaussian(&coefficients));
+    /// Looks at what lies half a px beside the best shift of each density; the first one is tried on all of them.
+    fn closer(&mut self, coefficients: &dyn Fn([f64; 2]) -> Vec<f32>) {
+        let mut taken: BTreeMap<[i32; 2], usize> = BTreeMap::new();
+        for density in (0..self.densities.len()).rev() {
+            for halves in self.round_best(density) {
+                let index = *taken.entry(halves).or_insert(self.shifted.len());
+                if index == self.shifted.len() {
+                    self.shifted.push(seen(halves, self.factor, coefficients));
+                }
+                if density > 0 {
+                    self.fit(density, index);
+                }
+            }
         }
-        self.shifted.push(Shifted { shift, coefficients });
+        taken.into_values().for_each(|index| self.fit(0, index));
+    }
+
+    fn fit(&mut self, density: usize, shift: usize) {
+        let fit = self.densities[density].gaussian(&self.shifted[shift].coefficients);
+        self.fits[density].push((shift, fit));
     }
 
     /// What lies half a px (of the photo) beside the best shift of a density, in half px.
     fn round_best(&self, density: usize) -> Vec<[i32; 2]> {
         let free = self.free();
-        let fit = |i: usize| self.fits[density][i] + self.prior(i, &free);
-        let best = (0..self.shifted.len()).max_by(|&a, &b| fit(a).total_cmp(&fit(b)));
-        let [x, y] = best.map_or([0, 0], |i| self.shifted[i].shift.map(|v| (v * self.factor * 2.0).round() as i32));
+        let fit = |&(i, fit): &(usize, f64)| fit + self.prior(i, &free);
+        let best = self.fits[density].iter().max_by(|a, b| fit(a).total_cmp(&fit(b)));
+        let [x, y] = best.map_or([0, 0], |b| self.shifted[b.0].shift.map(|v| (v * self.factor * 2.0).round() as i32));
         let ways = [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]];
         ways.into_iter().map(|[dx, dy]| [x + dx, y + dy]).collect()
     }
@@ -97,19 +109,33 @@ impl<'a> Look<'a> {
     /// Log-likelihood and index of the shift at which a density fits best; `weight` is that of the place beside the image.
     pub(super) fn likeliest(&self, density: usize, expected: &Expected, weight: f64) -> (f64, usize) {
         let prior = |i: usize| weight * self.prior(i, expected);
-        let mut quick: Vec<(f64, usize)> =
-            self.fits[density].iter().enumerate().map(|(i, fit)| (fit + prior(i), i)).collect();
+        let mut quick: Vec<(f64, usize)> = self.fits[density].iter().map(|&(i, fit)| (fit + prior(i), i)).collect();
         quick.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let robust =
-            |&(_, i): &(f64, usize)| (self.densities[density].student(&self.shifted[i].coefficients) + prior(i), i);
+        let robust = |&(_, i): &(f64, usize)| (self.student(density, i) + prior(i), i);
         let listed = quick.iter().take(SHORT_LIST).map(robust);
         listed.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))).unwrap_or((f64::NEG_INFINITY, 0))
+    }
+
+    /// A density's log-likelihood at a shift, worked out once.
+    fn student(&self, density: usize, shift: usize) -> f64 {
+        let known = self.robust.borrow().get(&(density, shift)).copied();
+        known.unwrap_or_else(|| {
+            let value = self.densities[density].student(&self.shifted[shift].coefficients);
+            self.robust.borrow_mut().insert((density, shift), value);
+            value
+        })
     }
 
     /// The shift (node px) at which the first density fits best.
     pub fn best_shift(&self) -> [f64; 2] {
         self.shifted[self.likeliest(0, &self.free(), 1.0).1].shift
     }
+}
+
+/// A node's coefficients at a shift in half px of the photo.
+fn seen(halves: [i32; 2], factor: f64, coefficients: &dyn Fn([f64; 2]) -> Vec<f32>) -> Shifted {
+    let shift = halves.map(|v| f64::from(v) / 2.0 / factor);
+    Shifted { shift, coefficients: coefficients(shift) }
 }
 
 /// How far to look along one axis for a standard deviation (px of the photo).

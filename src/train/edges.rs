@@ -72,7 +72,7 @@ fn field(ground: &Ground, shot: &Shot, index: usize) -> Field {
     // From a fifth to twice the described power: a description is a prior only.
     let weights: Vec<f64> = ground.powers.iter().map(|p| p * stream.between(0.2f64.ln(), 2f64.ln()).exp()).collect();
     let light = shot.lit(&weights).reduced((ground.factor / ground.base) as usize);
-    Field::new(&light, NOISE, false, false)
+    Field::new(light, NOISE, false, false)
 }
 
 /// Mean over the shots of the unit gradient at the image of `point`, brought back to the nominal image: a gradient is a
