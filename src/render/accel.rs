@@ -79,12 +79,12 @@ impl Accel {
         Accel { bvh, corners, original }
     }
 
-    /// The nearest triangle on the ray.
-    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+    /// The nearest triangle on the ray among those that count where it meets them (index, weights of the corners).
+    pub fn closest(&self, ray: &Ray, counts: impl Fn(usize, [f32; 3]) -> bool) -> Option<Hit> {
         match Shear::longest_axis(ray.direction) {
-            0 => self.closest_along::<0>(ray),
-            1 => self.closest_along::<1>(ray),
-            _ => self.closest_along::<2>(ray),
+            0 => self.closest_along::<0>(ray, counts),
+            1 => self.closest_along::<1>(ray, counts),
+            _ => self.closest_along::<2>(ray, counts),
         }
     }
 
@@ -97,19 +97,19 @@ impl Accel {
         }
     }
 
-    fn closest_along<const AXIS: usize>(&self, ray: &Ray) -> Option<Hit> {
+    fn closest_along<const AXIS: usize>(&self, ray: &Ray, counts: impl Fn(usize, [f32; 3]) -> bool) -> Option<Hit> {
         let shear = Shear::new::<AXIS>(ray);
         let mut nearest: Option<Hit> = None;
         self.bvh.ray_traverse(box_ray(ray), &mut RayHit::none(), |limited, i| {
             match shear.intersect::<AXIS>(&self.corners[i], limited.tmax) {
-                Some((t, weights)) => {
-                    nearest = Some(Hit { t, triangle: i, weights });
+                Some((t, weights)) if counts(self.original[i] as usize, weights) => {
+                    nearest = Some(Hit { t, triangle: self.original[i] as usize, weights });
                     t
                 }
-                None => f32::INFINITY,
+                _ => f32::INFINITY,
             }
         });
-        nearest.map(|hit| Hit { triangle: self.original[hit.triangle] as usize, ..hit })
+        nearest
     }
 
     fn occluded_along<const AXIS: usize>(&self, ray: &Ray) -> bool {
@@ -290,7 +290,7 @@ mod tests {
             let reach = if i % 2 == 0 { f32::INFINITY } else { s.between(1.0, 30.0) as f32 };
             let ray = Ray { origin, direction: random_direction(&mut s), reach };
             let expected = brute_force(&triangles, &ray);
-            let hit = accel.closest(&ray);
+            let hit = accel.closest(&ray, |_, _| true);
             assert_eq!(hit.is_some(), expected.is_some(), "ray {i}");
             assert_eq!(accel.occluded(&ray), expected.is_some(), "ray {i}");
             if let (Some(hit), Some(t)) = (hit, expected) {
@@ -316,7 +316,7 @@ mod tests {
                     let target = Vec3::zeros().map(|_: f32| s.between(-20.0, 20.0) as f32);
                     let ray = Ray { origin: target - direction * 60.0, direction, reach: f32::INFINITY };
                     let expected = brute_force(&triangles, &ray);
-                    assert_eq!(accel.closest(&ray).is_some(), expected.is_some(), "{direction:?}");
+                    assert_eq!(accel.closest(&ray, |_, _| true).is_some(), expected.is_some(), "{direction:?}");
                     hits += usize::from(expected.is_some());
                 }
             }
@@ -332,7 +332,7 @@ mod tests {
         for z in [0.0, -0.0] {
             let ray =
                 Ray { origin: Vec3::new(-300.0, 0.0, 6.0), direction: Vec3::new(1.0, 0.0, z), reach: f32::INFINITY };
-            assert_eq!(accel.closest(&ray).map(|h| h.t), Some(600.0));
+            assert_eq!(accel.closest(&ray, |_, _| true).map(|h| h.t), Some(600.0));
         }
     }
 
@@ -347,7 +347,10 @@ mod tests {
                 for target in [a, a.lerp(&b, 0.5), b.lerp(&c, s.uniform() as f32), (a + b + c) / 3.0] {
                     let origin = Vec3::zeros().map(|_: f32| s.between(-0.3, 0.3) as f32 * radius);
                     let ray = Ray { origin, direction: (target - origin).normalize(), reach: f32::INFINITY };
-                    assert!(accel.closest(&ray).is_some() && accel.occluded(&ray), "radius {radius} {target:?}");
+                    assert!(
+                        accel.closest(&ray, |_, _| true).is_some() && accel.occluded(&ray),
+                        "radius {radius} {target:?}"
+                    );
                 }
             }
         }
@@ -356,10 +359,10 @@ mod tests {
     #[test]
     fn nothing_and_one_triangle_are_fine() {
         let ray = Ray { origin: Vec3::new(0.1, 0.1, 5.0), direction: Vec3::new(0.0, 0.0, -1.0), reach: f32::INFINITY };
-        assert!(Accel::new(&[]).closest(&ray).is_none());
+        assert!(Accel::new(&[]).closest(&ray, |_, _| true).is_none());
         let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let broken = [[f32::NAN, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let hit = Accel::new(&[broken, triangle]).closest(&ray).unwrap();
+        let hit = Accel::new(&[broken, triangle]).closest(&ray, |_, _| true).unwrap();
         assert!((hit.t - 5.0).abs() < 1e-5 && hit.triangle == 1);
         assert!((hit.weights[1] - 0.1).abs() < 1e-6 && (hit.weights[2] - 0.1).abs() < 1e-6);
     }

@@ -1,8 +1,8 @@
 //! Broken edges: no real edge is sharp, and its rounding catches light that neither face would send to the camera.
 //!
 //! In: a triangle mesh with its faces. Out: for every triangle the sides that lie on a convex edge between two faces, with
-//! the other face's normals; and the normal of the rounded surface near them. The silhouette stays sharp: a tenth of a
-//! millimetre is below a pixel, its glint is not.
+//! the other face's normals; the normal of the rounded surface near them; and which rays pass where the rounding took
+//! material away. Shadows stay those of sharp edges.
 
 use super::vector::Vec3;
 use crate::solid::TriMesh;
@@ -75,6 +75,38 @@ pub(super) fn rounded(
     normal
 }
 
+/// Whether a ray that meets a triangle, from either side, at a point with barycentric `weights` passes through what the
+/// rounding of one of its edges took away. The edge is taken for straight, the rounding for a cylinder that touches both
+/// faces `width` (mm) from it.
+pub(super) fn passes(
+    direction: Vec3,
+    corners: [Vec3; 3],
+    weights: [f32; 3],
+    sides: &[Option<Beyond>; 3],
+    width: f32,
+) -> bool {
+    let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+    let double_area = normal.norm();
+    let own = normal / double_area;
+    sides.iter().enumerate().any(|(side, beyond)| {
+        let Some([from, to]) = beyond else { return false };
+        let line = corners[(side + 1) % 3] - corners[side];
+        let length = line.norm();
+        let distance = weights[(side + 2) % 3] * double_area / length;
+        if distance >= width {
+            return false;
+        }
+        let edge = line / length;
+        let along = weights[(side + 1) % 3] / (weights[side] + weights[(side + 1) % 3]).max(1e-6);
+        let cosine = own.dot(&from.lerp(to, along).normalize());
+        let radius = width * (1.0 + cosine) / (1.0 - cosine * cosine).max(1e-6).sqrt();
+        // From the cylinder's axis to the point, and the ray across the axis: they are as far apart as their cross product says.
+        let arm = own.cross(&edge) * (distance - width) + own * radius;
+        let across = direction - edge * edge.dot(&direction);
+        arm.cross(&across).norm_squared() > radius * radius * across.norm_squared()
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,5 +151,27 @@ mod tests {
         assert!((at(0.0).angle(&Vec3::z()) - std::f32::consts::FRAC_PI_4).abs() < 1e-3);
         assert!(at(0.25).x > 0.1 && at(0.25).x < at(0.1).x);
         assert_eq!(at(0.6), Vec3::z());
+    }
+
+    /// A rounding of radius r draws the silhouette of a right angle in by r (sin θ + cos θ - 1), seen from θ above; what enters
+    /// at the top and passes leaves at the side.
+    #[test]
+    fn a_rounding_draws_the_silhouette_in() {
+        let mesh = corner();
+        let sides = sides(&mesh, &Matrix3::identity());
+        let corners = |i: usize| mesh.triangles[i].map(|i| mesh.positions[i as usize].coords.cast());
+        let radius = 0.5f32;
+        for degrees in [20.0f32, 45.0, 60.0, 80.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let limit = radius * (sin + cos - 1.0) / sin;
+            let passes = |triangle: usize, distance: f32| {
+                let c = distance / 4.0;
+                let weights = [0.5 - c / 2.0, 0.5 - c / 2.0, c];
+                passes(Vec3::new(cos, 0.0, -sin), corners(triangle), weights, &sides[triangle], radius)
+            };
+            assert!(passes(0, 0.98 * limit) && passes(1, 0.98 * limit * sin / cos), "behind the edge");
+            assert!(!passes(0, 1.02 * limit) && !passes(1, 1.02 * limit * sin / cos), "meets the rounding");
+            assert!(!passes(0, 1.5 * radius), "meets the face");
+        }
     }
 }

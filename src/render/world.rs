@@ -5,7 +5,7 @@
 
 use super::accel::{Accel, Corners, Ray};
 use super::bsdf::Bsdf;
-use super::edge_break::{Beyond, rounded, sides};
+use super::edge_break::{Beyond, passes, rounded, sides};
 use super::lamp::{FlatLamp, LampHit, Sky};
 use super::mottle::blotches;
 use super::vector::Vec3;
@@ -102,7 +102,8 @@ impl World {
         let mut reach = lamp.map_or(ray.reach, |(_, hit)| hit.t);
         let ground = self.ground.as_ref().and_then(|g| g.hit(ray)).filter(|&t| t < reach);
         reach = ground.unwrap_or(reach);
-        if let Some(hit) = self.accel.closest(&Ray { reach, ..*ray }) {
+        let stands = |triangle: usize, weights: [f32; 3]| self.stands(ray.direction, triangle, weights);
+        if let Some(hit) = self.accel.closest(&Ray { reach, ..*ray }, stands) {
             return self.on_body(ray, hit.triangle, hit.weights);
         }
         match (ground, lamp, &self.ground) {
@@ -110,6 +111,16 @@ impl World {
             (_, Some((index, hit)), _) => Encounter::Lamp { index, hit },
             _ => Encounter::Nothing,
         }
+    }
+
+    /// Whether a ray that meets a triangle meets the surface: not where it passes through what an edge's rounding took away.
+    fn stands(&self, direction: Vec3, index: usize, weights: [f32; 3]) -> bool {
+        let triangle = &self.triangles[index];
+        let width = self.skins[triangle.skin as usize].edge_break;
+        if width <= 0.0 || triangle.sides.iter().all(Option::is_none) {
+            return true;
+        }
+        !passes(direction, self.corners[index].map(Vec3::from), weights, &triangle.sides, width)
     }
 
     /// The first lamp on a ray, as if there were nothing else.

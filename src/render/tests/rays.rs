@@ -77,7 +77,7 @@ fn no_ray_slips_between_the_triangles_of_real_parts() {
             for direction in directions.map(|d| Vec3::from(d).normalize()) {
                 for target in targets(&triangles, direction).into_iter().step_by(3) {
                     let ray = Ray { origin: target - direction * 200.0, direction, reach: f32::INFINITY };
-                    let met = accel.closest(&ray).is_some_and(|hit| hit.t <= 200.0 * (1.0 + BEHIND));
+                    let met = accel.closest(&ray, |_, _| true).is_some_and(|hit| hit.t <= 200.0 * (1.0 + BEHIND));
                     let shaded = accel.occluded(&Ray { reach: 200.0 * (1.0 + BEHIND), ..ray });
                     rays += 1;
                     leaks += usize::from(!met || !shaded);
@@ -113,7 +113,7 @@ fn the_rasteriser_sees_what_rays_see() {
                 direction: Vec3::from(direction.map(|c| c as f32)),
                 reach: f32::INFINITY,
             };
-            let hit = accel.closest(&ray);
+            let hit = accel.closest(&ray, |_, _| true);
             let seen = hit.map_or((0, 0), |hit| owners[hit.triangle]);
             // Flush faces are met at one depth; which of two is named is the rasteriser's rule, not the ray's.
             let depth = hit.map_or(f64::INFINITY, |hit| f64::from(hit.t) * dot(direction, camera.axes[2]));
