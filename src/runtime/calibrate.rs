@@ -220,7 +220,7 @@ pub fn fit(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationEr
     let first = photos.first().ok_or(CalibrationError::NoPhoto)?;
     let prepared = Prepared::new(model).ok_or(CalibrationError::Unusable)?;
     let noise = noise_of(&first.light).max(ROUNDING);
-    let search = Search::new(&model.locator);
+    let search = Search::new(model);
     let fields: Vec<Fields> = photos.iter().map(|p| search.fields(&p.light, noise)).collect();
     let (installation, poses, score) = install(model, &search, &fields)?;
     let camera = installation.apply(&model.station.camera);

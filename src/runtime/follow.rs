@@ -15,7 +15,7 @@ const LAST_REACH: f64 = 1.25;
 /// Scale of the robust weight on the distance to an edge (fine px).
 const ROBUST_SCALE: f64 = 0.5;
 /// Standard deviation of one edge point's position (fine px): measurement noise of the calibration's least squares.
-const EDGE_SIGMA: f64 = 0.7;
+pub(super) const EDGE_SIGMA: f64 = 0.7;
 /// Agreement an edge must have to count.
 const LEAST_AGREEMENT: f32 = 0.5;
 
@@ -35,7 +35,7 @@ pub(super) struct View<'a> {
 impl View<'_> {
     pub(super) fn pulls(
         &self,
-        points: &[EdgePoint],
+        points: &[(EdgePoint, f64)],
         reach: f64,
         parameters: &[f64],
         project: impl Fn(&[f64], &EdgePoint) -> Option<[f64; 2]>,
@@ -45,7 +45,7 @@ impl View<'_> {
         debug_assert!(std::ptr::eq(self.camera, camera));
         points
             .iter()
-            .filter_map(|point| {
+            .filter_map(|(point, trust)| {
                 let (at, direction) = point.seen(self.camera, pose)?;
                 let (distance, agreement) = self.field.nearest_edge(at, direction, reach)?;
                 if agreement <= LEAST_AGREEMENT {
@@ -63,7 +63,7 @@ impl View<'_> {
                     moved[i] = parameters[i];
                 }
                 let robust = 1.0 / (1.0 + (distance / ROBUST_SCALE).powi(2));
-                Some(Pull { distance, gradient, weight: f64::from(agreement) * robust })
+                Some(Pull { distance, gradient, weight: f64::from(agreement) * robust * trust })
             })
             .collect()
     }

@@ -123,7 +123,7 @@ impl<'a> Inspector<'a> {
         let densities = |(i, n): (usize, &NodeImages)| n.densities(&light, calibration.noise, &references(i));
         let densities = prepared.nodes.iter().enumerate().map(densities).collect();
         let camera = calibration.installation.apply(&model.station.camera);
-        let search = Search::new(&model.locator);
+        let search = Search::new(&model);
         let expected = expected(&model, &calibration);
         Some(Inspector { model, calibration, camera, search, prepared, light, densities, expected })
     }
@@ -152,7 +152,7 @@ impl<'a> Inspector<'a> {
             return None;
         }
         let attempt = |group: usize| -> Option<Verdict> {
-            let search = Search::without(locator, Some(group));
+            let search = Search::without(&self.model, Some(group));
             let fields = search.fields(&photo.light, self.calibration.noise);
             let found = search.locate(&fields, &self.camera, &widened(&self.model))?;
             let verdict = (found.score >= least).then(|| self.judge(photo, found))?;

@@ -7,10 +7,11 @@
 
 use super::camera::{Camera, Vec3, sub};
 use super::field::Field;
-use super::follow::{View, follow};
+use super::follow::{EDGE_SIGMA, View, follow};
 use super::grid::Grid;
-use super::model::{Locator, PointGroup};
+use super::model::{Locator, Model, PointGroup, PointSet};
 use super::pose::{Installation, Pose};
+use super::settle;
 
 /// How many coarse poses are followed, quickly, and how many of them to the end.
 const BEAM: usize = 12;
@@ -63,6 +64,8 @@ pub struct Search {
     fine_factor: u32,
     unsigned: bool,
     groups: Vec<Vec<Alternative>>,
+    /// Per group, the standard deviation of its component's place (px of the photo).
+    plays: Vec<f64>,
 }
 
 struct Alternative {
@@ -86,6 +89,19 @@ pub struct Fields {
     finer: Vec<(u32, Field)>,
 }
 
+/// A photo's field at one resolution, and the camera that sees it so.
+struct Level<'a> {
+    field: &'a Field,
+    camera: Camera,
+    factor: u32,
+}
+
+impl<'a> Level<'a> {
+    fn new(field: &'a Field, camera: &Camera, factor: u32) -> Level<'a> {
+        Level { field, camera: camera.reduced(factor), factor }
+    }
+}
+
 /// How thoroughly edges are followed: steps, and one edge point in so many.
 #[derive(Clone, Copy)]
 struct Effort {
@@ -97,28 +113,23 @@ const QUICK: Effort = Effort { rounds: 4, stride: 4 };
 const FULL: Effort = Effort { rounds: 9, stride: 1 };
 
 impl Search {
-    pub fn new(locator: &Locator) -> Search {
-        Search::without(locator, None)
+    pub fn new(model: &Model) -> Search {
+        Search::without(model, None)
     }
 
     /// The same without the points of one group.
-    pub fn without(locator: &Locator, skipped: Option<usize>) -> Search {
+    pub fn without(model: &Model, skipped: Option<usize>) -> Search {
+        let play = |group: &PointGroup| model.nodes.iter().find(|n| n.name == group.name).map_or(0.0, settle::play);
+        let groups = model.locator.groups.iter().enumerate().filter(|(i, _)| Some(*i) != skipped);
+        Search::of(&model.locator, groups.map(|(_, group)| (group, play(group))))
+    }
+
+    /// Each group with the standard deviation of its component's place (px of the photo).
+    fn of<'a>(locator: &Locator, groups: impl Iterator<Item = (&'a PointGroup, f64)>) -> Search {
         let points = |rows: &[[i32; 6]]| rows.iter().map(EdgePoint::from_row).collect();
-        let group = |g: &PointGroup| {
-            g.alternatives.iter().map(|s| Alternative { coarse: points(&s.coarse), fine: points(&s.fine) }).collect()
-        };
-        Search {
-            coarse_factor: locator.coarse,
-            fine_factor: locator.fine,
-            unsigned: locator.unsigned,
-            groups: locator
-                .groups
-                .iter()
-                .enumerate()
-                .filter(|(i, _)| Some(*i) != skipped)
-                .map(|(_, g)| group(g))
-                .collect(),
-        }
+        let set = |s: &PointSet| Alternative { coarse: points(&s.coarse), fine: points(&s.fine) };
+        let (groups, plays) = groups.map(|(g, play)| (g.alternatives.iter().map(set).collect(), play)).unzip();
+        Search { coarse_factor: locator.coarse, fine_factor: locator.fine, unsigned: locator.unsigned, groups, plays }
     }
 
     /// Orientation fields of a photo whose pixels have noise `noise`.
@@ -135,17 +146,18 @@ impl Search {
     /// The best pose within `standing` (ranges of x, y, z, rz), or `None` when there is nothing to go by.
     pub fn locate(&self, fields: &Fields, camera: &Camera, standing: &[[f64; 2]; 4]) -> Option<Located> {
         let candidates = self.coarse(fields, &camera.reduced(self.coarse_factor), standing);
-        let fine = camera.reduced(self.fine_factor);
+        let fine = Level::new(&fields.fine, camera, self.fine_factor);
         let followed = |pose: Pose, effort: Effort| {
-            let pose = self.refine(&fields.fine, &fine, pose, standing, effort);
-            Located { pose, score: self.score(&fields.fine, &fine, &pose) }
+            let pose = self.refine(&fine, pose, standing, effort);
+            Located { pose, score: self.score(&fields.fine, &fine.camera, &pose) }
         };
         let mut quick: Vec<Located> = candidates.into_iter().map(|pose| followed(pose, QUICK)).collect();
         quick.sort_by(|a, b| b.score.total_cmp(&a.score));
         let finalists = quick.into_iter().take(FINALISTS).map(|found| followed(found.pose, FULL));
         let found = finalists.max_by(|a, b| a.score.total_cmp(&b.score))?;
-        let finer =
-            |pose, (factor, field): &(u32, Field)| self.refine(field, &camera.reduced(*factor), pose, standing, FULL);
+        let finer = |pose, (factor, field): &(u32, Field)| {
+            self.refine(&Level::new(field, camera, *factor), pose, standing, FULL)
+        };
         Some(Located { pose: fields.finer.iter().fold(found.pose, finer), ..found })
     }
 
@@ -268,18 +280,24 @@ impl Search {
         self.groups.iter().map(group).sum::<f64>() / weight.max(1) as f64
     }
 
-    /// The fine points of the alternatives that fit best at a pose.
-    fn chosen(&self, field: &Field, camera: &Camera, pose: &Pose) -> Vec<EdgePoint> {
+    /// The fine points of the alternatives that fit best at a pose, one in `stride`, each with its weight. The points of a part
+    /// that has play move together, so all of them tell no more than the play lets them: with a common error of variance p²
+    /// beside σ² of each, n points count 1 / (1 + n p² / σ²) each.
+    fn chosen(&self, field: &Field, camera: &Camera, pose: &Pose, factor: u32, stride: usize) -> Vec<(EdgePoint, f64)> {
         let clear = |a: &Alternative| agreement(field, camera, pose, a) / (a.fine.len().max(1) as f64).sqrt();
-        let best = |group: &Vec<Alternative>| {
+        let best = |(group, play): (&Vec<Alternative>, &f64)| {
             let scored = group.iter().map(|a| (clear(a), a));
-            scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, a)| a.fine.clone()).unwrap_or_default()
+            let points = scored.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(&[][..], |(_, a)| &a.fine);
+            let noise = EDGE_SIGMA * f64::from(factor);
+            let weight = 1.0 / (1.0 + points.len() as f64 * (play / noise).powi(2));
+            points.iter().step_by(stride).map(|&p| (p, weight)).collect::<Vec<_>>()
         };
-        self.groups.iter().flat_map(best).collect()
+        self.groups.iter().zip(&self.plays).flat_map(best).collect()
     }
 
     /// Follows the edges from `pose` by robust least squares over the axes that may vary.
-    fn refine(&self, field: &Field, camera: &Camera, pose: Pose, standing: &[[f64; 2]; 4], effort: Effort) -> Pose {
+    fn refine(&self, level: &Level, pose: Pose, standing: &[[f64; 2]; 4], effort: Effort) -> Pose {
+        let Level { field, camera, factor } = *level;
         let free: Vec<usize> = (0..4).filter(|&i| standing[i][1] - standing[i][0] > 1e-9).collect();
         let spread = free.iter().map(|&i| (standing[i][1] - standing[i][0]) * 10.0).collect::<Vec<_>>();
         let with = |parameters: &[f64]| {
@@ -287,10 +305,11 @@ impl Search {
             free.iter().zip(parameters).for_each(|(&i, v)| array[i] += v);
             Pose::from_array(array)
         };
+        let camera = &camera;
         let view = View { field, camera };
         let parameters = follow(vec![0.0; free.len()], &spread, effort.rounds, |parameters, reach| {
             let pose = with(parameters);
-            let points: Vec<EdgePoint> = self.chosen(field, camera, &pose).into_iter().step_by(effort.stride).collect();
+            let points = self.chosen(field, camera, &pose, factor, effort.stride);
             view.pulls(&points, reach, parameters, |p, point| camera.project(with(p).apply(point.at)), &pose, camera)
         });
         let mut array = with(&parameters).to_array();
@@ -330,7 +349,7 @@ impl Search {
                 for (photo, fields) in fields.iter().enumerate() {
                     let (installation, pose) = split(parameters, photo);
                     let camera = installation.apply(nominal).reduced(factor);
-                    let points = self.chosen(field(fields), &camera, &pose);
+                    let points = self.chosen(field(fields), &camera, &pose, factor, FULL.stride);
                     let view = View { field: field(fields), camera: &camera };
                     let project = |p: &[f64], point: &EdgePoint| {
                         let (installation, pose) = split(p, photo);
@@ -439,10 +458,9 @@ mod tests {
         let camera = Camera::look_at([0.0, -60.0, 150.0], [0.0; 3], 700.0, [240, 200]);
         let points = PointSet { fault: "good".into(), coarse: outline(), fine: outline() };
         let groups = vec![PointGroup { name: "square".into(), alternatives: vec![points] }];
-        (camera, Search::new(&Locator { coarse: 4, fine: 2, unsigned: false, groups, accept: 0.0 }))
+        let locator = Locator { coarse: 4, fine: 2, unsigned: false, groups, accept: 0.0 };
+        (camera, Search::of(&locator, locator.groups.iter().map(|g| (g, 0.0))))
     }
-
-    use crate::runtime::model::PointSet;
 
     #[test]
     fn a_pose_is_found_to_a_tenth_of_a_pixel() {
@@ -482,5 +500,29 @@ mod tests {
         let black = Grid::filled(240, 200, 0.0);
         let found = search.locate(&search.fields(&black, 0.005), &camera, &[[-1.0, 1.0]; 4]).unwrap();
         assert!(found.score < 0.1);
+    }
+
+    /// Half of the outline's points belong to a part that lies 1 px beside its place: with the play it has, the pose stays with
+    /// the other half.
+    #[test]
+    fn a_part_with_play_does_not_drag_the_pose() {
+        let (camera, _) = setup();
+        let standing = [[-4.0, 4.0], [-4.0, 4.0], [0.0, 0.0], [-0.1, 0.1]];
+        let truth = Pose { x: 1.0, y: -0.5, z: 0.0, rz: 0.02 };
+        let fields = |search: &Search| search.fields(&photo(&camera, &truth), 0.005);
+        let mut moved = outline();
+        moved.iter_mut().for_each(|row| row[0] += 250);
+        let group = |name: &str, rows: Vec<[i32; 6]>| PointGroup {
+            name: name.into(),
+            alternatives: vec![PointSet { fault: "good".into(), coarse: rows.clone(), fine: rows }],
+        };
+        let groups = vec![group("base", outline()), group("loose", moved)];
+        let locator = Locator { coarse: 4, fine: 2, unsigned: false, groups, accept: 0.0 };
+        let off = |play: f64| {
+            let search = Search::of(&locator, locator.groups.iter().zip([0.0, play]));
+            let found = search.locate(&fields(&search), &camera, &standing).unwrap();
+            (found.pose.x - truth.x).abs()
+        };
+        assert!(off(0.0) > 0.08 && off(1.5) < 0.03, "{} {}", off(0.0), off(1.5));
     }
 }

@@ -21,6 +21,11 @@ pub struct Expected {
     pub spread: [f64; 2],
 }
 
+/// Standard deviation of a component's place by its tolerances alone (px of the photo), along the axis where it is largest.
+pub fn play(node: &Node) -> f64 {
+    node.spread.iter().map(|s| (s * s - POSE_RESIDUAL.powi(2)).max(0.0).sqrt()).fold(0.0, f64::max)
+}
+
 /// A node's place after some photos that showed it at `seen` (px): a normal station error of which the photos are noisy readings.
 pub fn after(node: &Node, seen: &[[f64; 2]]) -> Expected {
     let count = seen.len() as f64;
