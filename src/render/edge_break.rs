@@ -1,7 +1,7 @@
 //! Broken edges: no real edge is sharp, and its rounding catches light that neither face would send to the camera.
 //!
 //! In: a triangle mesh with its faces. Out: for every triangle the sides that lie on a convex edge between two faces, with
-//! the other face's normals; the normal of the rounded surface near them; and which rays pass where the rounding took
+//! the other face's normals; the normal of the rounded surface that a ray meets; and which rays pass where the rounding took
 //! material away. Shadows stay those of sharp edges.
 
 use super::vector::Vec3;
@@ -50,34 +50,72 @@ fn beyond(
     (convex && own.dot(&ends[0]) < SMOOTH).then_some(ends)
 }
 
-/// The normal of the rounded surface at a point with barycentric `weights` of a triangle. `width` (mm) is how far the
-/// rounding reaches into the face; at the edge itself the normal is midway between the two faces.
+/// The rounding of a side as a ray meets it: the edge is taken for straight, the rounding for a cylinder that touches both faces
+/// `width` (mm) from it.
+struct Rounding {
+    /// From the cylinder's axis to where the ray meets the sharp face.
+    arm: Vec3,
+    /// The ray across the axis.
+    across: Vec3,
+    radius: f32,
+    /// How far from the edge the ray meets the sharp face (mm).
+    distance: f32,
+}
+
+impl Rounding {
+    /// `own` is the normal of the face where it meets the triangle, `weights` are barycentric. `None` away from the edge.
+    fn new(
+        (direction, own): (Vec3, Vec3),
+        corners: [Vec3; 3],
+        weights: [f32; 3],
+        (side, [from, to]): (usize, &Beyond),
+        width: f32,
+    ) -> Option<Rounding> {
+        let line = corners[(side + 1) % 3] - corners[side];
+        let length = line.norm();
+        let double_area = line.cross(&(corners[(side + 2) % 3] - corners[side])).norm();
+        let distance = weights[(side + 2) % 3] * double_area / length;
+        if distance >= width {
+            return None;
+        }
+        let edge = line / length;
+        let along = weights[(side + 1) % 3] / (weights[side] + weights[(side + 1) % 3]).max(1e-6);
+        let cosine = own.dot(&from.lerp(to, along).normalize());
+        let radius = width * (1.0 + cosine) / (1.0 - cosine * cosine).max(1e-6).sqrt();
+        let arm = own.cross(&edge) * (distance - width) + own * radius;
+        Some(Rounding { arm, across: direction - edge * edge.dot(&direction), radius, distance })
+    }
+
+    fn is_missed(&self) -> bool {
+        self.arm.cross(&self.across).norm_squared() > self.radius * self.radius * self.across.norm_squared()
+    }
+
+    /// Where the ray meets the cylinder.
+    fn normal(&self) -> Vec3 {
+        let [a, b] = [self.across.norm_squared(), self.arm.dot(&self.across)];
+        let c = self.arm.norm_squared() - self.radius * self.radius;
+        let on = (-b - (b * b - a * c).max(0.0).sqrt()) / a.max(f32::MIN_POSITIVE);
+        (self.arm + self.across * on).normalize()
+    }
+}
+
+/// The normal of the rounded surface that a ray meets where it meets a triangle at a point with barycentric `weights`;
+/// `smooth` is that of the face. `width` (mm) is how far the rounding reaches into the face. Of two edges the nearer counts.
 pub(super) fn rounded(
     smooth: Vec3,
+    direction: Vec3,
     corners: [Vec3; 3],
     weights: [f32; 3],
     sides: &[Option<Beyond>; 3],
     width: f32,
 ) -> Vec3 {
-    let mut normal = smooth;
-    let double_area = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
-    for (side, beyond) in sides.iter().enumerate() {
-        let Some([from, to]) = beyond else { continue };
-        let (a, b) = (corners[side], corners[(side + 1) % 3]);
-        let length = (b - a).norm();
-        let distance = weights[(side + 2) % 3] * double_area / length;
-        if distance < width {
-            let along = weights[(side + 1) % 3] / (weights[side] + weights[(side + 1) % 3]).max(1e-6);
-            let other = from.lerp(to, along);
-            normal = normal.lerp(&other, 0.5 * (1.0 - distance / width)).normalize();
-        }
-    }
-    normal
+    let convex = sides.iter().enumerate().filter_map(|(side, beyond)| Some((side, beyond.as_ref()?)));
+    let met = convex.filter_map(|side| Rounding::new((direction, smooth), corners, weights, side, width));
+    met.min_by(|a, b| a.distance.total_cmp(&b.distance)).map_or(smooth, |rounding| rounding.normal())
 }
 
 /// Whether a ray that meets a triangle, from either side, at a point with barycentric `weights` passes through what the
-/// rounding of one of its edges took away. The edge is taken for straight, the rounding for a cylinder that touches both
-/// faces `width` (mm) from it.
+/// rounding of one of its edges took away.
 pub(super) fn passes(
     direction: Vec3,
     corners: [Vec3; 3],
@@ -85,25 +123,10 @@ pub(super) fn passes(
     sides: &[Option<Beyond>; 3],
     width: f32,
 ) -> bool {
-    let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-    let double_area = normal.norm();
-    let own = normal / double_area;
-    sides.iter().enumerate().any(|(side, beyond)| {
-        let Some([from, to]) = beyond else { return false };
-        let line = corners[(side + 1) % 3] - corners[side];
-        let length = line.norm();
-        let distance = weights[(side + 2) % 3] * double_area / length;
-        if distance >= width {
-            return false;
-        }
-        let edge = line / length;
-        let along = weights[(side + 1) % 3] / (weights[side] + weights[(side + 1) % 3]).max(1e-6);
-        let cosine = own.dot(&from.lerp(to, along).normalize());
-        let radius = width * (1.0 + cosine) / (1.0 - cosine * cosine).max(1e-6).sqrt();
-        // From the cylinder's axis to the point, and the ray across the axis: they are as far apart as their cross product says.
-        let arm = own.cross(&edge) * (distance - width) + own * radius;
-        let across = direction - edge * edge.dot(&direction);
-        arm.cross(&across).norm_squared() > radius * radius * across.norm_squared()
+    let own = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
+    let mut convex = sides.iter().enumerate().filter_map(|(side, beyond)| Some((side, beyond.as_ref()?)));
+    convex.any(|side| {
+        Rounding::new((direction, own), corners, weights, side, width).is_some_and(|rounding| rounding.is_missed())
     })
 }
 
@@ -139,17 +162,19 @@ mod tests {
         assert!(sides[2].iter().all(Option::is_none), "the foot of the step is a corner, not an edge");
     }
 
+    /// Seen straight from above, the normal of a quarter circle leans by what is left of the radius.
     #[test]
-    fn the_normal_turns_from_one_face_to_halfway() {
+    fn the_normal_is_that_of_the_cylinder() {
         let mesh = corner();
         let sides = sides(&mesh, &Matrix3::identity());
         let corners = mesh.triangles[0].map(|i| mesh.positions[i as usize].coords.cast());
         let at = |distance: f32| {
             let c = distance / 4.0;
-            rounded(Vec3::z(), corners, [0.5 - c / 2.0, 0.5 - c / 2.0, c], &sides[0], 0.5)
+            rounded(Vec3::z(), -Vec3::z(), corners, [0.5 - c / 2.0, 0.5 - c / 2.0, c], &sides[0], 0.5)
         };
-        assert!((at(0.0).angle(&Vec3::z()) - std::f32::consts::FRAC_PI_4).abs() < 1e-3);
-        assert!(at(0.25).x > 0.1 && at(0.25).x < at(0.1).x);
+        for distance in [0.01f32, 0.1, 0.25, 0.4, 0.49] {
+            assert!((at(distance).x - (0.5 - distance) / 0.5).abs() < 1e-3, "{distance}: {:?}", at(distance));
+        }
         assert_eq!(at(0.6), Vec3::z());
     }
 

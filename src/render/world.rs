@@ -155,7 +155,7 @@ impl World {
         let [p, q, r] = triangle.normals;
         let smooth = (p * weights[0] + q * weights[1] + r * weights[2]).normalize();
         let width = self.skins[triangle.skin as usize].edge_break;
-        let smooth = rounded(smooth, [a, b, c], weights, &triangle.sides, width);
+        let smooth = rounded(smooth, ray.direction, [a, b, c], weights, &triangle.sides, width);
         let shading = facing(smooth, geometric, ray.direction);
         let skin = &self.skins[triangle.skin as usize];
         let grooves = skin.grooves(position, triangle.face).filter(|along| lies_in(along, shading));
