@@ -20,6 +20,9 @@ const LEAST_UNSIGNED: f32 = 0.4;
 /// Noise level under which orientations fade, share of full scale.
 const NOISE: f64 = 0.01;
 
+/// An edge point that scatters more than this from shot to shot (standard deviation, px of the field) is no sure one.
+const MOST_SCATTER: f64 = 0.3;
+
 /// A place of the nominal image: its point of the assembly, if it may serve.
 pub type Surface<'a> = dyn Fn(usize, usize) -> Option<Vec3> + 'a;
 
@@ -63,7 +66,15 @@ pub fn find(ground: &Ground, surface: &Surface, count: usize) -> Vec<EdgePoint> 
         let near = edge_point(&camera, &ground.home, points[index]?, [*x as f64, *y as f64], mean[index])?;
         settled(&camera, &ground.home, &fields, near, points[index]?, mean[index])
     };
-    thinned.iter().filter_map(point).collect()
+    sure(thinned.iter().filter_map(point).collect())
+}
+
+/// The points whose place scatters little from shot to shot: on a wide rounding the light decides where an edge is. At least
+/// half of all.
+fn sure(mut points: Vec<(EdgePoint, f64)>) -> Vec<EdgePoint> {
+    points.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let count = points.iter().filter(|(_, scatter)| *scatter <= MOST_SCATTER).count().max(points.len().div_ceil(2));
+    points.into_iter().take(count).map(|(point, _)| point).collect()
 }
 
 /// Orientation field of a shot under its own random mix of lamps.
@@ -169,7 +180,8 @@ fn edge_point(camera: &Camera, home: &Pose, point: Vec3, at: [f64; 2], gradient:
     Some(EdgePoint { at: plane, along: std::array::from_fn(|i| plane[i] + unit[i]) })
 }
 
-/// The point moved across its edge to where the shots have the edge in the middle: the place to a fraction of a px.
+/// The point moved across its edge to where the shots have the edge in the middle, the place to a fraction of a px, and how far
+/// the shots scatter about it (standard deviation, px of the field).
 fn settled(
     camera: &Camera,
     home: &Pose,
@@ -177,21 +189,26 @@ fn settled(
     near: EdgePoint,
     surface: Vec3,
     gradient: [f32; 2],
-) -> Option<EdgePoint> {
+) -> Option<(EdgePoint, f64)> {
     /// As far as the nearest pixel corner may be, and a little.
     const REACH: f64 = 1.5;
-    let distance = |(field, pose): &(Field, &Pose)| {
+    // Where the edge is not found, it is as far off as that.
+    let distance = |(field, pose): &(Field, &Pose)| -> Option<f32> {
         let (at, direction) = near.seen(camera, pose)?;
-        field.nearest_edge(at, direction, REACH).map(|(distance, _)| distance as f32)
+        Some(field.nearest_edge(at, direction, REACH).map_or(REACH, |(distance, _)| distance) as f32)
     };
-    let mut distances: Vec<f32> = fields.iter().filter_map(distance).collect();
-    if distances.is_empty() {
-        return Some(near);
+    let distances: Vec<f32> = fields.iter().filter_map(distance).collect();
+    let mut found: Vec<f32> = distances.iter().copied().filter(|d| f64::from(*d) < REACH).collect();
+    if found.is_empty() {
+        return Some((near, REACH));
     }
-    let middle = f64::from(linear::median(&mut distances));
+    let middle = linear::median(&mut found);
+    let mut apart: Vec<f32> = distances.iter().map(|d| (d - middle).abs()).collect();
+    // The median distance of a normal variable from its mean is 0.6745 standard deviations.
+    let scatter = f64::from(linear::median(&mut apart)) / 0.6745;
     let (at, direction) = near.seen(camera, home)?;
-    let moved = [0, 1].map(|k| at[k] + middle * f64::from(direction[k]));
-    edge_point(camera, home, surface, moved, gradient)
+    let moved = [0, 1].map(|k| at[k] + f64::from(middle) * f64::from(direction[k]));
+    Some((edge_point(camera, home, surface, moved, gradient)?, scatter))
 }
 
 /// The grey value below which a share of the pixels lies.
