@@ -16,6 +16,7 @@ pub mod stats;
 pub mod synthesise;
 mod thresholds;
 pub mod verify;
+mod white;
 
 use crate::assembly::error_tree::ErrorTree;
 use crate::assembly::fault::ErrorMode;
@@ -89,7 +90,8 @@ pub fn train(job: &Job, observer: &Observer) -> Result<(Model, Vec<Diagnostic>),
     verify::settle(&mut model, job.design, &learnt.scenes, job.modes, &learnt.held_out);
     let mut found = blind(job, &learnt.unseen);
     found.extend(overlaps(job, &model));
-    let doubts = advised(job, found, &mut learnt.advice)?;
+    let mut doubts = advised(job, found, &mut learnt.advice)?;
+    doubts.extend(white::highlights(job, &model));
     if is_new {
         kept::keep_learnt(job, &learnt);
     }
