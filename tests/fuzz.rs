@@ -238,6 +238,7 @@ fn peak_memory_kb() -> u64 {
     line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse().ok()).unwrap_or(0)
 }
 
+#[cfg(feature = "compile")]
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }

@@ -4,6 +4,7 @@
 
 #![cfg(feature = "cli")]
 
+use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -165,6 +166,72 @@ fn the_goldens_own_tolerances_decide() {
     bench.change(CONTACTS, "tolerance of gap: ±0.001", "tolerance of gap: a lot");
     bench.run("check", &["--stage", "contacts"]).expect(1, "line 3: `// tolerance of gap: a lot` is no tolerance");
     bench.run("bless", &["--stage", "contacts"]).expect(1, "nothing was blessed");
+}
+
+/// The objects on standard output.
+fn objects(run: &Run) -> Vec<Value> {
+    run.out.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}"))).collect()
+}
+
+#[test]
+fn programs_are_told_every_difference() {
+    let bench = Bench::new("json", "contacts,insertion");
+    let json = ["--stage", "contacts,insertion,measures", "--message-format", "json"];
+    let run = bench.run("check", &json);
+    assert_eq!((run.code, run.err.as_str()), (0, ""));
+    let said = objects(&run);
+    assert_eq!(said.len(), 3, "two goldens and a summary");
+    assert!(said[..2].iter().all(|o| o["reason"] == "golden" && o["verdict"] == "equal"), "{}", run.out);
+    assert_eq!((&said[2]["reason"], &said[2]["equal"]), (&json!("golden-summary"), &json!(2)));
+
+    bench.change(CONTACTS, "mmc: 0.004", "mmc: 0.005");
+    bench.change(CONTACTS, "kind: Cylinder", "kind: Cone");
+    bench.write("golden/plate/measures.ron", "[1]\n");
+    bench.write("golden/plate/notes.txt", "hello");
+    fs::remove_file(bench.0.join("golden/plate/insertion.ron")).unwrap();
+    let run = bench.run("check", &[&json[..], &["--diff"]].concat());
+    assert_eq!((run.code, run.err.as_str()), (1, ""));
+    let said = objects(&run);
+    let of = |file: &str| said.iter().find(|o| o["file"] == format!("golden/plate/{file}")).unwrap();
+    let contacts = of("contacts.ron");
+    assert_eq!((&contacts["spec"], &contacts["stage"]), (&json!("plate.gng"), &json!("contacts")));
+    let kind = json!({ "path": "contacts[0].kind", "expected": "Cone", "actual": "Cylinder", "tolerance": null });
+    let gap = json!({
+        "path": "contacts[0].gap.mmc", "expected": "0.005", "actual": "0.004",
+        "tolerance": { "absolute": 0.0002, "share": 0.0 },
+    });
+    assert_eq!(contacts["differences"], json!([kind, gap]));
+    assert_eq!(contacts["kept"], "target/golden/plate/contacts.ron");
+    assert!(bench.has("target/golden/plate/contacts.ron"));
+    assert!(contacts["diff"].as_str().unwrap().starts_with("--- golden/plate/contacts.ron\n+++ "));
+    let verdicts = ["insertion.ron", "measures.ron", "notes.txt"].map(|file| of(file)["verdict"].clone());
+    assert_eq!(verdicts, [json!("missing"), json!("stale"), json!("stranger")]);
+    let summary = said.last().unwrap();
+    let counts = ["equal", "differs", "missing", "stale", "stranger", "unclear", "faulty_specs"].map(|k| &summary[k]);
+    assert_eq!(counts, [0, 1, 1, 1, 1, 0, 0].map(|n| json!(n)).each_ref());
+    assert_eq!(summary["bless"], json!(["gonogo golden bless plate.gng --stage contacts,insertion,measures"]));
+
+    for (more, dry, code) in [(&["--dry-run"][..], true, 1), (&[], false, 0)] {
+        let run = bench.run("bless", &[&json[..], more].concat());
+        assert_eq!((run.code, run.err.as_str()), (0, ""));
+        let said = objects(&run);
+        let done: Vec<&Value> = said.iter().filter(|o| o["done"].is_string()).map(|o| &o["done"]).collect();
+        assert_eq!(done, ["blessed", "blessed", "removed"], "{}", run.out);
+        let last = said.last().unwrap();
+        assert_eq!((&last["blessed"], &last["removed"], &last["dry_run"]), (&json!(2), &json!(1), &json!(dry)));
+        assert_eq!(bench.run("check", &json).code, code);
+    }
+}
+
+#[test]
+fn programs_are_told_of_specs_with_errors() {
+    let bench = Bench::new("json_errors", "contacts");
+    bench.change("plate.gng", "material = ", "material = un");
+    let run = bench.run("check", &["--message-format", "json"]);
+    assert_eq!((run.code, run.err.as_str()), (1, ""));
+    let said = objects(&run);
+    assert!(said[0]["code"].is_string() && said[0]["reason"].is_null(), "{}", run.out);
+    assert_eq!(said.last().unwrap()["faulty_specs"], 1);
 }
 
 #[test]

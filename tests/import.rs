@@ -227,3 +227,55 @@ fn texts_that_are_no_designs_are_refused_where_they_go_wrong() {
     assert_eq!(faults("")[0].0, "E0903");
     assert_eq!(openscad("cube(size = 1);", "x.csg", "on").unwrap_err()[0].code, "E0903");
 }
+
+/// Three boxes of which two are turned about a corner that all have in common, as in OpenSCAD's own example of `rotate`; once as
+/// newer versions print it, and once with six digits. Their places have to be as exact as their angles: corners that lie
+/// 3e-6 mm from each other are neither one corner nor two.
+#[test]
+fn corners_that_coincide_in_the_design_coincide_in_the_part() {
+    let cube = "cube(size = [1, 2, 3], center = false);\n";
+    // Turned by 45 deg about x, then y, then z, in 16 digits.
+    let sixteen = "multmatrix([[0.5000000000000001, -0.14644660940672627, 0.853553390593274, 0], [0.5000000000000001, 0.853553390593274, -0.14644660940672627, 0], [-0.7071067811865476, 0.5000000000000001, 0.5000000000000001, 0], [0, 0, 0, 1]])";
+    let six = "multmatrix([[0.5, -0.146447, 0.853553, 0], [0.5, 0.853553, -0.146447, 0], [-0.707107, 0.5, 0.5, 0], [0, 0, 0, 1]])";
+    let quarter = "multmatrix([[0.7071067811865476, -0.7071067811865476, 0, 0], [0.7071067811865476, 0.7071067811865476, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])";
+    let of = |turn: &str, about_z: &str| {
+        let inner = format!("{turn} {{\n{cube}}}\n{cube}{about_z} {{\n{cube}}}\n");
+        volumes(&imported(&moved([-6.0, 0.0, 0.0], &inner)))[0]
+    };
+    let exact = of(sixteen, quarter);
+    assert!((6.0..18.0).contains(&exact), "{exact}");
+    let printed = of(six, &quarter.replace("0.7071067811865476", "0.707107"));
+    assert!((printed - exact).abs() < 1e-6 * exact, "{printed} {exact}");
+    // Two of them share a wedge of 45 deg along their common edge: 18 less what they overlap, by integration over the wedge.
+    let two =
+        |about_z: &str| volumes(&imported(&moved([-6.0, 0.0, 0.0], &format!("{cube}{about_z} {{\n{cube}}}\n"))))[0];
+    let common = 3.0 * wedge();
+    assert!((two(quarter) - (12.0 - common)).abs() < 1e-6, "{} {common}", two(quarter));
+}
+
+/// Area that the rectangle 1 × 2 and the same turned by 45° to the left about its corner have in common.
+fn wedge() -> f64 {
+    // Clip one by the four sides of the other.
+    let (s, c) = FRAC_PI_4.sin_cos();
+    let turned = |[x, y]: [f64; 2]| [c * x - s * y, s * x + c * y];
+    let mut area: Vec<[f64; 2]> = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]];
+    let other: Vec<[f64; 2]> = area.iter().map(|p| turned(*p)).collect();
+    for i in 0..4 {
+        let (a, b) = (other[i], other[(i + 1) % 4]);
+        let side = |p: [f64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+        let mut kept = Vec::new();
+        for k in 0..area.len() {
+            let (p, q) = (area[k], area[(k + 1) % area.len()]);
+            let (u, v) = (side(p), side(q));
+            if u >= 0.0 {
+                kept.push(p);
+            }
+            if (u < 0.0) != (v < 0.0) {
+                kept.push([0, 1].map(|i| p[i] + (q[i] - p[i]) * u / (u - v)));
+            }
+        }
+        area = kept;
+    }
+    let cross = |k: usize| area[k][0] * area[(k + 1) % area.len()][1] - area[k][1] * area[(k + 1) % area.len()][0];
+    (0..area.len()).map(cross).sum::<f64>() / 2.0
+}

@@ -134,6 +134,9 @@ fn deep_nesting_is_refused_and_not_overflowed() {
         load(&groups(depth));
     }
     parse(&"part p {\n".repeat(10_000), 0);
+    // Braces that line up with nothing, and one that ends what many parentheses began: each bracket is looked at once.
+    parse(&format!("part p {{\n{}{}", "  a {\n".repeat(20_000), " }\n".repeat(20_000)), 0);
+    parse(&format!("part p {{\n{}\n}}\n", "add a = (\n".repeat(20_000)), 0);
 }
 
 #[test]

@@ -69,6 +69,7 @@ impl Studio<'_> {
         light.sort_by(f32::total_cmp);
         let bright = light.get((light.len() as f64 * (1.0 - HIGHLIGHTS)) as usize).copied().unwrap_or(0.0);
         let gain = if bright > 0.0 { f64::from(EXPOSED_TO / bright) } else { 1.0 };
+        let gain = gain * self.station.exposure.range.nominal;
         powers.iter().map(|p| p * gain).collect()
     }
 
@@ -76,7 +77,7 @@ impl Studio<'_> {
     fn expose(&self, shot: &LightImages, weights: &[f64], number: u64) -> Vec<u8> {
         let camera = &self.station.camera;
         let sensor = Sensor {
-            blur: camera.blur.nominal,
+            blur: camera.blur.range.nominal,
             vignetting: camera.vignetting.nominal,
             read_noise: self.station.noise,
             full_well: camera.full_well,

@@ -3,14 +3,16 @@
 //! In: specs, and a folder with a folder of goldens for each. Out: what differs, what is missing and what is not made any
 //! more; with `bless`, new goldens. What counts as different is decided in [`crate::golden`].
 
-use super::args::{Colour, Global, GoldenArgs, GoldenBless, GoldenCheck};
+use super::args::{Colour, Global, GoldenArgs, GoldenBless, GoldenCheck, MessageFormat};
 use super::compile::{self, Document};
+use super::golden_json::{Counts, Said};
 use super::output::{self, DASH, Failure};
 use super::{Exit, messages};
 use crate::artifacts::{self, Artifact};
 use crate::golden::{self, Difference, LARGEST, Tolerances, pictures};
 use crate::line::Stage;
 use crate::{Compiled, Options};
+use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{self, IsTerminal};
@@ -19,21 +21,26 @@ use std::path::{Path, PathBuf};
 /// Compares. What differs is kept, named and told apart from what is missing.
 pub fn check(args: &GoldenCheck, global: &Global) -> Result<Exit, Failure> {
     let mut exit = Exit::Fine;
+    let mut counts = Counts::default();
+    let (mut faulty_specs, mut commands) = (0, Vec::new());
     for case in cases(&args.golden, global)? {
         let Some(case) = case else {
             exit = Exit::Faults;
+            faulty_specs += 1;
             continue;
         };
         let verdicts = case.verdicts();
         let keep = (!args.beside).then(|| args.keep.join(&case.name));
         let mut faulty = BTreeSet::new();
         for (file, verdict) in &verdicts {
-            if told(&case, file, verdict, &args.golden, keep.as_deref(), global)? {
+            if told(&case, file, verdict, &args.golden, keep.as_deref(), global, &mut counts)? {
                 faulty.extend(stage_of(file));
             }
         }
-        case.tell_strangers();
-        if faulty.is_empty() {
+        case.tell_strangers(global, &mut counts)?;
+        if is_json(global) {
+            commands.extend((!faulty.is_empty()).then(|| case.command(&faulty, &args.golden.dir)));
+        } else if faulty.is_empty() {
             let agree = if verdicts.len() == 1 {
                 "1 golden agrees".into()
             } else {
@@ -42,10 +49,19 @@ pub fn check(args: &GoldenCheck, global: &Global) -> Result<Exit, Failure> {
             output::line(&format!("{}: {agree}", case.folder.display()))?;
         } else {
             output::remark(&format!("  to bless what is right: {}", case.command(&faulty, &args.golden.dir)));
+        }
+        if !faulty.is_empty() {
             exit = Exit::Faults;
         }
     }
+    if is_json(global) {
+        counts.finish(&[("faulty_specs", json!(faulty_specs)), ("bless", json!(commands))])?;
+    }
     Ok(exit)
+}
+
+fn is_json(global: &Global) -> bool {
+    global.message_format == MessageFormat::Json
 }
 
 /// Rewrites the blessed outputs that differ, all of them or none.
@@ -55,7 +71,7 @@ pub fn bless(args: &GoldenBless, global: &Global) -> Result<Exit, Failure> {
     }
     let cases = cases(&args.golden, global)?;
     let mut exit = Exit::Fine;
-    let mut changes = Vec::new();
+    let (mut changes, mut counts) = (Vec::new(), Counts::default());
     for case in &cases {
         let Some(case) = case else {
             exit = Exit::Faults;
@@ -68,7 +84,7 @@ pub fn bless(args: &GoldenBless, global: &Global) -> Result<Exit, Failure> {
             }
             changes.push(Change { path: case.folder.join(&file), file, case, verdict });
         }
-        case.tell_strangers();
+        case.tell_strangers(global, &mut counts)?;
     }
     if exit != Exit::Fine {
         output::remark("nothing was blessed");
@@ -77,12 +93,24 @@ pub fn bless(args: &GoldenBless, global: &Global) -> Result<Exit, Failure> {
     let contents = changes.iter().map(Change::content).collect::<Result<Vec<_>, Failure>>()?;
     let mut tally = Tally::default();
     for (change, content) in changes.iter().zip(contents) {
-        change.tell(&mut tally, &args.golden, global)?;
+        if is_json(global) {
+            counts.say(&change.said(&mut tally, &args.golden))?;
+        } else {
+            change.tell(&mut tally, &args.golden, global)?;
+        }
         if !args.dry_run {
             change.make(content)?;
         }
     }
-    output::line(&tally.line(args.dry_run))?;
+    if is_json(global) {
+        let Tally { blessed, removed, unchanged } = tally;
+        let done = [("blessed", blessed), ("removed", removed), ("unchanged", unchanged)];
+        let mut more: Vec<_> = done.map(|(key, count)| (key, json!(count))).into();
+        more.push(("dry_run", json!(args.dry_run)));
+        counts.finish(&more)?;
+    } else {
+        output::line(&tally.line(args.dry_run))?;
+    }
     Ok(Exit::Fine)
 }
 
@@ -107,6 +135,18 @@ enum Verdict {
     Stale,
     /// The blessed file allows something that cannot be understood.
     Unclear(String),
+}
+
+impl Verdict {
+    fn word(&self) -> &'static str {
+        match self {
+            Verdict::Equal => "equal",
+            Verdict::Differs(..) => "differs",
+            Verdict::Missing(_) => "missing",
+            Verdict::Stale => "stale",
+            Verdict::Unclear(_) => "unclear",
+        }
+    }
 }
 
 /// Each spec compiled as far as its goldens need; `None` for those with errors, which are reported.
@@ -172,10 +212,43 @@ impl Case {
     }
 
     /// Names what lies among the goldens and belongs to no stage.
-    fn tell_strangers(&self) {
+    fn tell_strangers(&self, global: &Global, counts: &mut Counts) -> Result<(), Failure> {
         for file in self.blessed.keys().filter(|file| stage_of(file).is_none()) {
-            output::remark(&format!("warning: {}: no stage writes this", self.folder.join(file).display()));
+            let golden = self.folder.join(file);
+            if is_json(global) {
+                counts.say(&Said { verdict: "stranger", ..self.said(&golden, file, &Verdict::Equal) })?;
+            } else {
+                output::remark(&format!("warning: {}: no stage writes this", golden.display()));
+            }
         }
+        Ok(())
+    }
+
+    /// What a program is told about a file, before anything is done about it.
+    fn said<'a>(&'a self, golden: &'a Path, file: &str, verdict: &'a Verdict) -> Said<'a> {
+        let (differences, why): (&[Difference], _) = match verdict {
+            Verdict::Differs(differences, _) => (differences, None),
+            Verdict::Unclear(why) => (&[], Some(why.as_str())),
+            _ => (&[], None),
+        };
+        Said {
+            spec: &self.spec,
+            golden,
+            stage: stage_of(file).map(|stage| stage.name()),
+            verdict: verdict.word(),
+            why,
+            differences,
+            kept: None,
+            diff: None,
+            done: None,
+        }
+    }
+
+    /// The lines of a text that differ.
+    fn diff(&self, golden: &Path, file: &str, content: &[u8]) -> Option<String> {
+        let blessed = self.blessed.get(file).filter(|_| !is_picture(file))?;
+        let (name, now) = (golden.display().to_string(), format!("{} (now)", golden.display()));
+        Some(golden::unified(&name, &lossy(blessed), &now, &lossy(content)))
     }
 
     /// What to type to bless these stages.
@@ -279,10 +352,16 @@ fn told(
     args: &GoldenArgs,
     keep: Option<&Path>,
     global: &Global,
+    counts: &mut Counts,
 ) -> Result<bool, Failure> {
     let golden = case.folder.join(file);
     let kept = keep.map_or_else(|| marked(&golden, "now"), |keep| keep.join(file));
-    let say = |what: &str| output::remark(&format!("error: {}: {what}", golden.display()));
+    let for_people = !is_json(global);
+    let say = |what: &str| {
+        if for_people {
+            output::remark(&format!("error: {}: {what}", golden.display()));
+        }
+    };
     let content = match verdict {
         Verdict::Equal => None,
         Verdict::Differs(differences, content) => {
@@ -306,10 +385,18 @@ fn told(
         // What an earlier run kept would mislead now.
         let _ = fs::remove_file(&kept);
         let _ = fs::remove_file(marked(&kept, "diff"));
+        if !for_people {
+            counts.say(&case.said(&golden, file, verdict))?;
+        }
         return Ok(!matches!(verdict, Verdict::Equal));
     };
     output::make_dir(kept.parent().unwrap_or(Path::new(".")))?;
     output::write(&kept, content)?;
+    if !for_people {
+        let diff = args.diff.then(|| case.diff(&golden, file, content)).flatten();
+        counts.say(&Said { kept: Some(&kept), diff, ..case.said(&golden, file, verdict) })?;
+        return Ok(true);
+    }
     output::remark(&format!("  the new output is {}", kept.display()));
     if let (true, Some(blessed)) = (args.diff, case.blessed.get(file)) {
         show(file, &golden, blessed, content, Some(&kept), global)?;
@@ -398,6 +485,17 @@ impl Tally {
     }
 }
 
+impl Tally {
+    fn count(&mut self, what: &'static str) -> &'static str {
+        match what {
+            "blessed" => self.blessed += 1,
+            "removed" => self.removed += 1,
+            _ => self.unchanged += 1,
+        }
+        what
+    }
+}
+
 impl Change<'_> {
     /// What will be in the file; `None` where nothing is written.
     fn content(&self) -> Result<Option<&[u8]>, Failure> {
@@ -432,6 +530,18 @@ impl Change<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The same for programs.
+    fn said(&self, tally: &mut Tally, args: &GoldenArgs) -> Said<'_> {
+        let said = self.case.said(&self.path, &self.file, &self.verdict);
+        let (done, content) = match &self.verdict {
+            Verdict::Equal | Verdict::Unclear(_) => (tally.count("unchanged"), None),
+            Verdict::Stale => (tally.count("removed"), None),
+            Verdict::Missing(content) | Verdict::Differs(_, content) => (tally.count("blessed"), Some(content)),
+        };
+        let diff = content.filter(|_| args.diff).and_then(|content| self.case.diff(&self.path, &self.file, content));
+        Said { done: Some(done), diff, ..said }
     }
 
     fn make(&self, content: Option<&[u8]>) -> Result<(), Failure> {

@@ -11,6 +11,7 @@ mod fix;
 mod font;
 mod format;
 mod golden;
+mod golden_json;
 mod import;
 mod judge;
 mod keep;

@@ -144,6 +144,9 @@ impl Resolver {
         let Some((key, cells)) = table.rows.iter().find(|(key, _)| wanted.is(&key.text)) else {
             return self.no_size(table, &wanted, family, value.span());
         };
+        if let Some(pitch) = wanted.pitch {
+            self.check_pitch(table, (*key, *cells), pitch, family, value.span());
+        }
         let size = number_of(&key.text) * self.file_scale(Quantity::Length, key.span);
         let typed = || Typed { expr: Expr::Const(size), quantity: Some(Quantity::Length) };
         let Value::Dim(dim) = value else { return };
@@ -177,18 +180,41 @@ impl Resolver {
         }
         match &dim.size {
             Size::Quantity(q) if q.unit.is_none() => {
-                Some(Wanted { text: q.number.text.clone(), value: q.number.value, thread: false })
+                Some(Wanted { text: q.number.text.clone(), value: q.number.value, thread: false, pitch: None })
             }
-            Size::Path(path) if path.word().is_some_and(is_thread) => {
-                let text = path.word().unwrap_or_default().to_string();
-                Some(Wanted { value: number_of(&text), text, thread: true })
+            Size::Path(path) if path.word().and_then(thread_of).is_some() => {
+                let (value, pitch) = path.word().and_then(thread_of)?;
+                Some(Wanted { value, text: path.word()?.to_string(), thread: true, pitch })
             }
             _ => {
                 let expr = self.dimension(dim, Quantity::Length, General::Basic, "size")?;
                 let value = trim(expr.eval(&self.nominal));
-                Some(Wanted { text: value.to_string(), value, thread: false })
+                Some(Wanted { text: value.to_string(), value, thread: false, pitch: None })
             }
         }
+    }
+
+    /// Reports a thread of another pitch than the one its row holds: its limits stand in no table here.
+    fn check_pitch(
+        &mut self,
+        table: &Table,
+        (key, cells): (&Name, &[ast::Dim]),
+        pitch: f64,
+        family: Family,
+        span: Span,
+    ) {
+        let column = table.columns.iter().position(|column| column.text == "pitch");
+        let own = column.and_then(|at| match &cells.get(at)?.size {
+            Size::Quantity(q) => Some((q.number.value, q.number.text.as_str())),
+            _ => None,
+        });
+        let label = match own {
+            Some((own, _)) if own == pitch => return,
+            Some((_, text)) => format!("the pitch of its `{}` is {text}", key.text),
+            None => format!("its `{}` has no pitch of its own", key.text),
+        };
+        let message = format!("`{}` has no `{}` with a pitch of {}", family.name.text, key.text, trim(pitch));
+        self.report(Diagnostic::error("E0214", span, message).label(label).meant(span, &key.text));
     }
 
     fn no_size(&mut self, table: &Table, wanted: &Wanted, family: Family, span: Span) {
@@ -275,6 +301,8 @@ struct Wanted {
     value: f64,
     /// With the M of a thread, which only such a size answers to.
     thread: bool,
+    /// Of a thread that is written with it: `M36x3`.
+    pitch: Option<f64>,
 }
 
 impl Wanted {
@@ -283,9 +311,14 @@ impl Wanted {
     }
 }
 
-/// `M6`, `M2.5`
-fn is_thread(word: &str) -> bool {
-    word.strip_prefix('M').is_some_and(|number| number.parse::<f64>().is_ok())
+/// `M6`, `M2.5`, `M36x3`: diameter and pitch.
+fn thread_of(word: &str) -> Option<(f64, Option<f64>)> {
+    let digits = |text: &str| text.bytes().all(|b| b.is_ascii_digit() || b == b'.');
+    let number = |text: &str| text.parse::<f64>().ok().filter(|_| digits(text));
+    match word.strip_prefix('M')?.split_once('x') {
+        Some((d, pitch)) => Some((number(d)?, Some(number(pitch)?))),
+        None => Some((number(&word[1..])?, None)),
+    }
 }
 
 /// The number of a size, in the unit of its file.

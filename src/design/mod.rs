@@ -20,6 +20,7 @@ pub mod model;
 mod outline;
 mod part;
 mod pattern;
+mod per_photo;
 mod primitive;
 mod profile;
 mod scope;

@@ -4,6 +4,7 @@
 //! per draw and used wherever its name stands, so faces that are flush on the drawing stay flush in every instance.
 //! Nothing here refers to the syntax tree but for spans.
 
+pub use super::per_photo::PerPhoto;
 pub use super::primitive::{Corner, Extent, Outline, OutlinePath, OutlineSide, Shape};
 use crate::diag::Span;
 use crate::units::{Quantity, Range};
@@ -249,7 +250,7 @@ pub struct CameraSpec {
     pub install_mm: f64,
     pub install_rad: f64,
     /// Standard deviation of the point spread in px.
-    pub blur: Range,
+    pub blur: PerPhoto,
     pub response: Response,
     #[serde(skip)]
     pub span: Span,
@@ -328,8 +329,8 @@ pub struct Station {
     pub y: Range,
     pub z: Range,
     pub rz: Range,
-    /// Exposure relative to nominal.
-    pub exposure: Range,
+    /// Exposure relative to the nominal one; its nominal value is how much brighter or darker than usual photos are.
+    pub exposure: PerPhoto,
     /// Standard deviation of the sensor's noise, share of full scale.
     pub noise: f64,
     #[serde(skip)]

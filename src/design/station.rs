@@ -3,7 +3,7 @@
 //! Every field has a default; docs/src/language.md lists them.
 
 use super::fields::Fields;
-use super::model::{CameraPlacing, CameraSpec, Floor, LightShape, LightSpec, Response, Station};
+use super::model::{CameraPlacing, CameraSpec, Floor, LightShape, LightSpec, PerPhoto, Response, Station};
 use super::scope::Resolver;
 use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{Body, Call, Name, Stmt, Value};
@@ -15,6 +15,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 const MAX_SIDE: u64 = 8192;
 const POSITIVE: [f64; 2] = [f64::MIN_POSITIVE, f64::MAX];
 const ANY: [f64; 2] = [f64::MIN, f64::MAX];
+/// Exposures beside the nominal one: beyond these a photo is black or white.
+const EXPOSURES: [f64; 2] = [0.05, 20.0];
 
 /// Steps (half image widths) in which a lens is searched for the radius from which on it folds the image over.
 const FOLD_STEP: f64 = 0.05;
@@ -85,10 +87,16 @@ impl Resolver {
             y: self.range_or(&vary, "y", Quantity::Length, still),
             z: self.range_or(&vary, "z", Quantity::Length, still),
             rz: self.range_or(&vary, "rz", Quantity::Angle, still),
-            exposure: self.range_within(&vary, "exposure", Quantity::Ratio, Range::symmetric(1.0, 0.05), POSITIVE),
+            exposure: self.per_photo(&vary, "exposure", Quantity::Ratio, Range::symmetric(1.0, 0.05), EXPOSURES),
             noise: self.exact_or(&vary, "noise", Quantity::Ratio, 0.005, [0.0, 1.0]),
             span: name.span,
         }
+    }
+
+    /// A range that acts only where it is written.
+    fn per_photo(&mut self, fields: &Fields, key: &str, want: Quantity, default: Range, limits: [f64; 2]) -> PerPhoto {
+        let range = self.range_within(fields, key, want, default, limits);
+        PerPhoto { range, varies: fields.get(key).is_some() && range.low < range.high }
     }
 
     fn dark(&mut self, name: &Name) {
@@ -127,7 +135,7 @@ impl Resolver {
             depth: self.whole_or(&fields, "depth", 8, [8, 16]) as u32,
             install_mm: self.error_of(&fields, "offset", Quantity::Length, 1.0),
             install_rad: self.error_of(&fields, "tilt", Quantity::Angle, 0.3f64.to_radians()),
-            blur: self.range_within(
+            blur: self.per_photo(
                 &fields,
                 "blur",
                 Quantity::Pixels,

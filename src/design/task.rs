@@ -12,6 +12,9 @@ use crate::units::Quantity;
 /// Share of good assemblies that may be rejected when nothing is said.
 const FALSE_REJECT: f64 = 0.001;
 
+/// Training images when nothing is said.
+const IMAGES: u64 = 14;
+
 impl Resolver {
     /// Without `watch` every component but the root is watched.
     pub fn inspect(&mut self, body: Option<(&Body, Span)>, built: &Assembled) -> Inspect {
@@ -84,6 +87,19 @@ impl Resolver {
         self.chosen(first, group.len()).map_or_else(Vec::new, |chosen| chosen.into_iter().map(|i| group[i]).collect())
     }
 
+    /// How many draws: spread is learnt from two on.
+    fn images(&mut self, fields: &Fields) -> u32 {
+        let images = self.whole_or(fields, "images", IMAGES, [1, 10_000]);
+        if let (true, Some(value)) = (images < 2, fields.get("images")) {
+            self.report(
+                Diagnostic::error("E0701", value.span(), "from one image nothing can be learnt about spread")
+                    .label("too few images")
+                    .suggest(format!("write `images = {IMAGES}`"), value.span(), IMAGES.to_string()),
+            );
+        }
+        images as u32
+    }
+
     pub fn train(&mut self, body: Option<(&Body, Span)>) -> Train {
         let nothing = Body::default();
         let (body, span) = body.unwrap_or((&nothing, Span::default()));
@@ -92,7 +108,7 @@ impl Resolver {
         // Seeds beyond 2^53 would not survive the way through a float.
         const LARGEST_SEED: u64 = 1 << 53;
         Train {
-            images: self.whole_or(&fields, "images", 14, [1, 10_000]) as u32,
+            images: self.images(&fields),
             seed: self.whole_or(&fields, "seed", 1, [0, LARGEST_SEED]),
             levels: self.whole_or(&fields, "levels", 4, [1, 8]) as u32,
             samples: self.whole_or(&fields, "samples", 16, [1, 65_536]) as u32,

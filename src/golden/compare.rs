@@ -1,16 +1,25 @@
 //! A new text against the blessed one, value by value.
 
-use super::tolerance::{Tolerance, Tolerances};
+use super::tolerance::{PictureTolerance, Tolerance, Tolerances};
 use super::tree::{Token, Tree};
 use std::fmt;
 
 /// A place at which two outputs differ.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Difference {
     /// `contacts[3].gap.mmc`
     pub path: String,
     pub blessed: String,
     pub now: String,
+    /// What it may differ by there; nothing where the two have to be equal.
+    pub allowed: Option<Allowed>,
+}
+
+/// A tolerance of what differs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Allowed {
+    Number(Tolerance),
+    Picture(PictureTolerance),
 }
 
 impl fmt::Display for Difference {
@@ -20,7 +29,7 @@ impl fmt::Display for Difference {
 }
 
 /// What came of a comparison.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Settled {
     /// In the order of the blessed text.
     pub differences: Vec<Difference>,
@@ -55,9 +64,12 @@ impl<'a> Judge<'_, 'a> {
     fn compare(&mut self, blessed: &Tree<'a>, now: &Tree<'a>, own: Option<Tolerance>) {
         match (blessed, now) {
             (Tree::Leaf(b), Tree::Leaf(n)) if b.text == n.text => {}
-            (Tree::Leaf(b), Tree::Leaf(n)) if self.allows(b.text, n.text, own) => self.equal.push((*n, b.text)),
+            (Tree::Leaf(b), Tree::Leaf(n)) => match self.allowed(b.text, n.text, own) {
+                Some((true, _)) => self.equal.push((*n, b.text)),
+                allowed => self.differ(b.text.into(), n.text.into(), allowed.map(|(_, tolerance)| tolerance)),
+            },
             (Tree::Branch(bh, b), Tree::Branch(nh, n)) if bh == nh => self.compare_items(b, n, own),
-            _ => self.differ(blessed.show(), now.show()),
+            _ => self.differ(blessed.show(), now.show(), None),
         }
     }
 
@@ -81,18 +93,18 @@ impl<'a> Judge<'_, 'a> {
                     let displaced = i != j && blessed.len() == now.len();
                     moved = moved.or_else(|| now.get(i).filter(|_| displaced).map(|(first, _)| (key, first)));
                 }
-                None => self.differ(value.show(), NOTHING.into()),
+                None => self.differ(value.show(), NOTHING.into(), None),
             }
             self.path.truncate(length);
         }
         let all_met = met.iter().all(|m| *m);
         for (j, (key, value)) in now.iter().enumerate().filter(|(j, _)| !met[*j]) {
             self.descend(key, j);
-            self.differ(NOTHING.into(), value.show());
+            self.differ(NOTHING.into(), value.show(), None);
             self.path.truncate(length);
         }
         if let (Some((blessed, now)), true) = (moved, all_met) {
-            self.differ(format!("`{blessed}` first"), format!("`{now}` first"));
+            self.differ(format!("`{blessed}` first"), format!("`{now}` first"), None);
         }
     }
 
@@ -108,17 +120,18 @@ impl<'a> Judge<'_, 'a> {
         }
     }
 
-    fn differ(&mut self, blessed: String, now: String) {
-        self.differences.push(Difference { path: self.path.clone(), blessed, now });
+    fn differ(&mut self, blessed: String, now: String, tolerance: Option<Tolerance>) {
+        let allowed = tolerance.map(Allowed::Number);
+        self.differences.push(Difference { path: self.path.clone(), blessed, now, allowed });
     }
 
-    fn allows(&self, blessed: &str, now: &str, own: Option<Tolerance>) -> bool {
-        let (Ok(b), Ok(n)) = (blessed.parse::<f64>(), now.parse::<f64>()) else { return false };
+    /// Whether two numbers count as equal, and by what; nothing for what must be equal.
+    fn allowed(&self, blessed: &str, now: &str, own: Option<Tolerance>) -> Option<(bool, Tolerance)> {
+        let (b, n) = blessed.parse::<f64>().ok().zip(now.parse::<f64>().ok())?;
         let whole = |text: &str| !text.contains(['.', 'e', 'E']);
-        match own {
-            Some(own) => own.allows(b, n),
-            None => !(whole(blessed) && whole(now)) && self.tolerances.decimals.allows(b, n),
-        }
+        let usual = (!(whole(blessed) && whole(now))).then_some(self.tolerances.decimals);
+        let tolerance = own.or(usual)?;
+        Some((tolerance.allows(b, n), tolerance))
     }
 }
 
@@ -146,7 +159,12 @@ fn first_line(root: &str, blessed: &str, now: &str) -> Option<Difference> {
         }
         if b != n {
             let show = |line: Option<&str>| line.unwrap_or("the end").to_string();
-            return Some(Difference { path: format!("{root} line {number}"), blessed: show(b), now: show(n) });
+            return Some(Difference {
+                path: format!("{root} line {number}"),
+                blessed: show(b),
+                now: show(n),
+                allowed: None,
+            });
         }
     }
     None
@@ -195,6 +213,16 @@ mod tests {
         assert_eq!(found("3.5)]", "3.5), 1]"), ["view.gaps[2]: nothing blessed, 1 now"]);
         assert_eq!(found("kind: Cylinder,", ""), ["view.kind: Cylinder blessed, nothing now"]);
         assert_eq!(found("Some(3.5)", "None"), ["view.gaps[1]: Some(3.5) blessed, None now"]);
+    }
+
+    #[test]
+    fn a_difference_says_what_was_allowed() {
+        let tolerances = Tolerances::of("// tolerance: ±0.001 ±0.01 %\n// tolerance of pixels: ±2 ±1 %\n").unwrap();
+        let now = BLESSED.replace("0.011", "0.016").replace("100", "110").replace("12", "13").replace("Plane", "Cone");
+        let differences = settle("view", BLESSED, &now, &tolerances).differences;
+        let allowed: Vec<Option<Allowed>> = differences.iter().map(|d| d.allowed).collect();
+        let number = |absolute, share| Some(Allowed::Number(Tolerance { absolute, share }));
+        assert_eq!(allowed, [number(0.001, 0.0001), number(2.0, 0.01), None], "{differences:?}");
     }
 
     #[test]

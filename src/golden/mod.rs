@@ -10,7 +10,7 @@ pub mod pictures;
 mod tolerance;
 mod tree;
 
-pub use compare::{Difference, Settled, settle};
+pub use compare::{Allowed, Difference, Settled, settle};
 pub use lines::unified;
 pub use tolerance::{PictureTolerance, Tolerance, Tolerances, Unclear, head, usual};
 

@@ -4,7 +4,7 @@
 //! that is too large is reduced by a whole number: every pixel is then the mean of a block, and less noisy.
 
 use super::LARGEST;
-use super::compare::Difference;
+use super::compare::{Allowed, Difference};
 use super::tolerance::PictureTolerance;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageFormat, Limits, Rgb, RgbImage};
@@ -47,7 +47,8 @@ pub fn reduced(png: &[u8]) -> Option<Vec<u8>> {
 
 /// How a new picture of any size departs from a blessed one.
 pub fn difference(blessed: &[u8], now: &[u8], allowed: &PictureTolerance) -> Option<Difference> {
-    let differ = |blessed: String, now: String| Some(Difference { path: "the picture".into(), blessed, now });
+    let differ =
+        |blessed: String, now: String| Some(Difference { path: "the picture".into(), blessed, now, allowed: None });
     let Some(blessed) = Picture::read(blessed) else { return differ("none".into(), "one".into()) };
     let Some(now) = Picture::read(now) else { return differ("one".into(), "none".into()) };
     let Some(now) = now.like(&blessed) else { return differ(blessed.form(), now.form()) };
@@ -67,7 +68,7 @@ pub fn difference(blessed: &[u8], now: &[u8], allowed: &PictureTolerance) -> Opt
     let (x, y) = (pixel % blessed.size[0] as usize, pixel / blessed.size[0] as usize);
     let path = format!("mean difference {mean:.2}, most at pixel ({x}, {y})");
     let [blessed, now] = [&blessed, &now].map(|picture| picture.values[place].to_string());
-    Some(Difference { path, blessed, now })
+    Some(Difference { path, blessed, now, allowed: Some(Allowed::Picture(*allowed)) })
 }
 
 /// Blessed, now, and eight times their difference, from left to right; `None` unless both are pictures.

@@ -347,7 +347,7 @@ fn matrix(node: &Node) -> Option<Matrix> {
     let rows: Vec<Vec<f64>> = node.get("")?.list()?.iter().map(Value::numbers).collect::<Option<_>>()?;
     let [x, y, z, ..] = rows.as_slice() else { return None };
     let good = [x, y, z].iter().all(|row| row.len() == 4 && row.iter().all(|v| v.is_finite()));
-    good.then(|| Matrix([x, y, z].map(|row| [row[0], row[1], row[2], row[3]])))
+    good.then(|| Matrix([x, y, z].map(|row| [row[0], row[1], row[2], row[3]])).tidied())
 }
 
 const NO_MATRIX: &str = "no matrix of four by four numbers";

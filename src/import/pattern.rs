@@ -137,13 +137,17 @@ fn circle(shape: &Shape, places: &[Placement]) -> Option<(Placement, Pattern)> {
     if radius < SAME || !places.iter().all(|p| near(arm(p)[0].hypot(arm(p)[1]), radius)) {
         return None;
     }
-    let degrees = |p: &Placement| arm(p)[1].atan2(arm(p)[0]).to_degrees().rem_euclid(360.0);
+    // A hundredth of a degree of six printed digits, more on small circles.
+    let slack = (SAME / radius).to_degrees().max(1e-3);
+    let degrees = |p: &Placement| {
+        let turn = arm(p)[1].atan2(arm(p)[0]).to_degrees().rem_euclid(360.0);
+        // A hair before a whole turn is the beginning.
+        if turn > 360.0 - slack { turn - 360.0 } else { turn }
+    };
     let step = 360.0 / n as f64;
     let mut sorted = places.to_vec();
     sorted.sort_by(|a, b| degrees(a).total_cmp(&degrees(b)));
     let from = degrees(&sorted[0]);
-    // A hundredth of a degree of six printed digits, more on small circles.
-    let slack = (SAME / radius).to_degrees().max(1e-3);
     let even = sorted.iter().enumerate().all(|(i, p)| (degrees(p) - from - step * i as f64).abs() < slack);
     let round =
         matches!(shape, Shape::Cylinder { .. } | Shape::Frustum { .. } | Shape::Torus { .. } | Shape::Revolve { .. })

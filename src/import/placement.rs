@@ -24,6 +24,8 @@ pub struct Parts {
 
 /// Columns whose cosine is larger than this are not square to each other: OpenSCAD prints six digits.
 const SQUARE: f64 = 1e-4;
+/// What six printed digits may be off by, as a share of the largest entry.
+const PRINTED: f64 = 1e-6;
 /// Angles nearer than this (degrees) to a round one are meant to be round.
 const ROUND_ANGLE: f64 = 1e-3;
 
@@ -41,6 +43,28 @@ impl Matrix {
             sum + if column == 3 { self.0[row][3] } else { 0.0 }
         };
         Matrix([0, 1, 2].map(|row| [0, 1, 2, 3].map(|column| cell(row, column))))
+    }
+
+    /// The matrix that was meant, where six printed digits are all that keeps it from turning by round angles: corners that
+    /// coincide in the design coincide then.
+    pub fn tidied(self) -> Matrix {
+        let meant = self.parts().map(|parts| {
+            let turned = Placement { at: [0.0; 3], ..parts.placed() };
+            let signs = [if parts.mirrored { -1.0 } else { 1.0 }, 1.0, 1.0];
+            let column = |i: usize| {
+                let mut axis = [0.0; 3];
+                axis[i] = parts.scale[i] * signs[i];
+                turned.point(axis)
+            };
+            let columns = [0, 1, 2].map(column);
+            Matrix([0, 1, 2].map(|row| [columns[0][row], columns[1][row], columns[2][row], self.0[row][3]]))
+        });
+        let near = |meant: &Matrix| {
+            let size = self.0.iter().flat_map(|row| &row[..3]).fold(0.0, |size: f64, v| size.max(v.abs()));
+            let apart = self.0.iter().zip(&meant.0).flat_map(|(a, b)| a.iter().zip(b));
+            apart.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) <= PRINTED * size
+        };
+        meant.filter(near).unwrap_or(self)
     }
 
     pub fn point(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {

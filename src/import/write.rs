@@ -8,8 +8,11 @@ use super::placement::Placement;
 use crate::diag::{Diagnostic, Span};
 use std::collections::BTreeMap;
 
-/// Coordinates and sizes are written to this many digits: OpenSCAD gives six in all.
+/// Coordinates and sizes are written to five decimals where that is what they are (mm).
 const DIGITS: f64 = 1e5;
+const MEANT: f64 = 5e-8;
+/// Others to eight: solids tell corners apart that are 1e-7 mm from each other.
+const MANY_DIGITS: f64 = 1e8;
 /// Sizes that ISO 2768 has general tolerances for (mm); there is none for the point of a cone.
 const GENERAL: std::ops::Range<f64> = 0.5..4000.0;
 /// A cut whose ends are no farther inside than this goes through (mm).
@@ -274,7 +277,11 @@ fn outline(number_of: usize, outline: &Outline) -> String {
     text + "}\n\n"
 }
 
+/// With few digits where few are meant, and with many where the number is none: corners that coincide in the design have to
+/// coincide here, to less than the solids can tell.
 fn number(value: f64) -> String {
-    let value = (value * DIGITS).round() / DIGITS;
+    let rounded = |digits: f64| (value * digits).round() / digits;
+    let short = rounded(DIGITS);
+    let value = if (value - short).abs() < MEANT { short } else { rounded(MANY_DIGITS) };
     if value == 0.0 { "0".to_string() } else { value.to_string() }
 }

@@ -224,7 +224,7 @@ fn log_uniform(range: &Range, u: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::model::{CameraPlacing, MaterialKind, Response};
+    use crate::design::model::{CameraPlacing, MaterialKind, PerPhoto, Response};
     use crate::diag::Span;
 
     fn spec() -> CameraSpec {
@@ -241,7 +241,7 @@ mod tests {
             depth: 8,
             install_mm: 1.5,
             install_rad: 0.007,
-            blur: Range::exactly(0.5),
+            blur: PerPhoto::exactly(0.5),
             response: Response::Linear,
             span: Span::default(),
         }
@@ -258,7 +258,7 @@ mod tests {
             y: Range::symmetric(0.0, 4.0),
             z: Range::exactly(0.0),
             rz: Range::symmetric(0.0, 0.1),
-            exposure: Range::exactly(1.0),
+            exposure: PerPhoto::exactly(1.0),
             noise: 0.005,
             span: Span::default(),
         }

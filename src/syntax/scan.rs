@@ -8,6 +8,7 @@ use super::lines::{
     line_end, line_number, outside_strings, owner, starts_block_item, starts_statement, strip_comment, trailing_gap,
 };
 use crate::diag::{Diagnostic, Span};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Parentheses nested deeper than this are refused, which bounds the parser's recursion.
@@ -91,6 +92,15 @@ enum Guess {
     ByIndent,
 }
 
+/// Where a lost bracket belongs, for people. A line is counted out only when it is told.
+#[derive(Clone, Copy)]
+enum Before {
+    ThisLine,
+    /// The line of this byte.
+    Line(usize),
+    End,
+}
+
 /// An opening bracket that still waits for its partner.
 struct Open {
     bracket: u8,
@@ -108,6 +118,8 @@ struct Scanner<'a> {
     /// Items that are known to be right, in their order.
     sound: &'a [Chunk],
     open: Vec<Open>,
+    /// How many of the open blocks begin at each indent.
+    blocks_at: BTreeMap<usize, usize>,
     chunks: Vec<Chunk>,
     diagnostics: Vec<Diagnostic>,
     repairs: Vec<(usize, u8)>,
@@ -138,6 +150,7 @@ impl<'a> Scanner<'a> {
             guess,
             sound,
             open: Vec::new(),
+            blocks_at: BTreeMap::new(),
             chunks: Vec::new(),
             diagnostics: Vec::new(),
             repairs: Vec::new(),
@@ -159,7 +172,7 @@ impl<'a> Scanner<'a> {
             start += line.len();
         }
         self.take_sound(self.text.len());
-        self.lose_all_open("the end of the file");
+        self.lose_all_open(Before::End);
         self.finish_chunk(self.text.len());
     }
 
@@ -167,7 +180,7 @@ impl<'a> Scanner<'a> {
     fn take_sound(&mut self, start: usize) -> bool {
         while let Some((chunk, later)) = self.sound.split_first().filter(|(chunk, _)| chunk.end <= start) {
             if !self.open.is_empty() {
-                self.lose_all_open(&format!("line {}", line_number(self.text, chunk.start)));
+                self.lose_all_open(Before::Line(chunk.start));
             }
             self.finish_chunk(chunk.start);
             self.chunks.push(chunk.clone());
@@ -193,7 +206,7 @@ impl<'a> Scanner<'a> {
             open.inner.get_or_insert(indent);
         }
         if self.guess != Guess::Nothing && indent == 0 && !self.open.is_empty() && starts_block_item(words) {
-            self.lose_all_open(&format!("line {}", line_number(self.text, start)));
+            self.lose_all_open(Before::Line(start));
         }
         if self.open.is_empty() && !words.starts_with('}') {
             self.finish_chunk(start);
@@ -237,7 +250,18 @@ impl<'a> Scanner<'a> {
             let help = "name an intermediate result with `let`";
             self.report(Diagnostic::error("E0101", self.span(open.at, 1), message).label("too deep here").help(help));
         }
+        if open.bracket == b'{' {
+            *self.blocks_at.entry(open.indent).or_default() += 1;
+        }
         self.open.push(open);
+    }
+
+    fn pop(&mut self) -> Option<Open> {
+        let open = self.open.pop()?;
+        if let Some(blocks) = self.blocks_at.get_mut(&open.indent).filter(|_| open.bracket == b'{') {
+            *blocks -= 1;
+        }
+        Some(open)
     }
 
     /// `indent` is where a `}` stands when it begins its line.
@@ -247,15 +271,15 @@ impl<'a> Scanner<'a> {
                 self.lose_blocks_deeper_than(indent, at);
             }
             while self.open.last().is_some_and(|o| o.bracket == b'(') {
-                self.lose_last(&format!("line {}", line_number(self.text, at)), at);
+                self.lose_last(Before::Line(at), at);
             }
         }
         match self.open.last() {
             Some(open) if open.bracket == bracket => {
                 let (from, lines_up) = (open.at, indent == Some(open.indent));
-                self.open.pop();
-                let one_line = !self.text[from..at].contains('\n');
-                if self.open.is_empty() && bracket == b'{' && !lines_up && !one_line {
+                self.pop();
+                // The text between is looked at for an outermost block only: nested ones would be read once for each around them.
+                if self.open.is_empty() && bracket == b'{' && !lines_up && self.text[from..at].contains('\n') {
                     let chunk = self.chunks.len().saturating_sub(1);
                     self.early = Some(Early { at, open: from, chunk });
                 }
@@ -334,19 +358,19 @@ impl<'a> Scanner<'a> {
     fn lose_blocks_left_by(&mut self, indent: usize) {
         let left = |o: &Open| o.bracket == b'{' && indent <= o.indent && o.inner.is_some_and(|inner| inner > o.indent);
         while self.open.last().is_some_and(left) {
-            self.lose_last(&format!("line {}", line_number(self.text, self.line_start)), self.line_start);
+            self.lose_last(Before::Line(self.line_start), self.line_start);
         }
     }
 
     /// A `}` that lines up with an outer block shows that the inner ones lost theirs.
     fn lose_blocks_deeper_than(&mut self, indent: usize, at: usize) {
         let aligned = |o: &Open| o.bracket == b'{' && o.indent == indent;
-        let guess = self.guess != Guess::Nothing && self.open.iter().any(aligned);
+        let guess = self.guess != Guess::Nothing && self.blocks_at.get(&indent).is_some_and(|&blocks| blocks > 0);
         if self.open.last().is_some_and(aligned) || !guess {
             return;
         }
         while !self.open.last().is_some_and(aligned) {
-            self.lose_last(&format!("line {}", line_number(self.text, at)), self.line_start);
+            self.lose_last(Before::Line(at), self.line_start);
         }
     }
 
@@ -354,20 +378,21 @@ impl<'a> Scanner<'a> {
     fn lose_parentheses_before(&mut self, words: &str) {
         let guess = self.guess != Guess::Nothing && starts_statement(words);
         while guess && self.open.last().is_some_and(|o| o.bracket == b'(') {
-            self.lose_last("this line", self.line_start);
+            self.lose_last(Before::ThisLine, self.line_start);
         }
     }
 
     /// What hangs open around the innermost bracket would be noise: only that one is reported.
-    fn lose_all_open(&mut self, before: &str) {
+    fn lose_all_open(&mut self, before: Before) {
         let alone = self.open.len() <= 1;
         self.lose_last(before, self.line_start);
         self.broken |= !alone;
         self.open.clear();
+        self.blocks_at.clear();
     }
 
-    fn lose_last(&mut self, before: &str, limit: usize) {
-        let Some(open) = self.open.pop() else { return };
+    fn lose_last(&mut self, before: Before, limit: usize) {
+        let Some(open) = self.pop() else { return };
         self.unpaired = true;
         if self.has_enough() {
             return;
@@ -376,12 +401,16 @@ impl<'a> Scanner<'a> {
     }
 
     /// The `}` belongs behind the last line of code.
-    fn lose_block(&mut self, open: &Open, before: &str) {
+    fn lose_block(&mut self, open: &Open, before: Before) {
         let end = self.code_end;
         let message = format!("this `{{`{} is never closed", owner(self.text, open.at));
         let indent = " ".repeat(open.indent);
         let fault = Diagnostic::error("E0102", self.span(open.at, 1), message).label("opened here");
-        let help = format!("a `}}` is missing before {before}");
+        let help = match before {
+            Before::ThisLine => "a `}` is missing before this line".to_string(),
+            Before::Line(at) => format!("a `}}` is missing before line {}", line_number(self.text, at)),
+            Before::End => "a `}` is missing before the end of the file".to_string(),
+        };
         let one_line = !self.text[open.at..end.max(open.at)].contains('\n');
         self.diagnostics.push(match one_line {
             true => fault.fix(help, self.span(end, 0), " }"),

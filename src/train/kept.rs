@@ -39,7 +39,7 @@ impl<'a> Kept<'a> {
         design.inspect.watch.clear();
         let shapes: Vec<&LightShape> = station.lights.iter().map(|light| &light.shape).collect();
         let ranges = [station.x, station.y, station.z, station.rz];
-        let taken = (&setup.camera, camera, setup.samples, setup.blur);
+        let taken = (&setup.camera, camera, setup.samples, setup.base, &station.camera.blur);
         Kept {
             cache: job.cache,
             design: job.design,

@@ -5,6 +5,7 @@
 //! trained is what will judge. Never reads a photo.
 
 mod edges;
+mod exposing;
 mod fit;
 mod kept;
 mod other_views;
@@ -15,6 +16,7 @@ pub mod stats;
 pub mod synthesise;
 mod thresholds;
 pub mod verify;
+mod white;
 
 use crate::assembly::error_tree::ErrorTree;
 use crate::assembly::fault::ErrorMode;
@@ -88,7 +90,8 @@ pub fn train(job: &Job, observer: &Observer) -> Result<(Model, Vec<Diagnostic>),
     verify::settle(&mut model, job.design, &learnt.scenes, job.modes, &learnt.held_out);
     let mut found = blind(job, &learnt.unseen);
     found.extend(overlaps(job, &model));
-    let doubts = advised(job, found, &mut learnt.advice)?;
+    let mut doubts = advised(job, found, &mut learnt.advice)?;
+    doubts.extend(white::highlights(job, &model));
     if is_new {
         kept::keep_learnt(job, &learnt);
     }
@@ -189,7 +192,7 @@ fn render(
         camera: camera.reduced(plan.base),
         lamps: build::lamps(job.station, camera),
         samples: job.design.train.samples,
-        blur: job.station.camera.blur.nominal / f64::from(plan.base),
+        base: plan.base,
     };
     let kept = Kept::new(job, &setup, camera);
     let total = draws.shots(plan);
@@ -206,11 +209,11 @@ fn fit_model(job: &Job, plan: &Plan, shots: &Shots) -> Model {
     let names = build::lamps(job.station, &job.camera);
     let described: Vec<f64> = lights.iter().map(|&l| job.station.lights[l].power).collect();
     let drift: Vec<f64> = lights.iter().map(|&l| job.station.lights[l].drift).collect();
-    let scale = exposure(plan, shots, &described);
+    let scale = exposure(plan, shots, &described) * job.station.exposure.range.nominal;
     let powers: Vec<f64> = described.iter().map(|p| p * scale).collect();
     let lamp =
         |i: usize| Lamp { name: names[i].name.clone(), light: lights[i] as u32, power: powers[i], drift: drift[i] };
-    let lamps: Vec<Lamp> = (0..powers.len()).map(lamp).collect();
+    let lamps = exposing::widened((0..powers.len()).map(lamp).collect(), &job.station.exposure);
     let station = station(job, lamps.clone());
     let home = Pose::home(&station);
     let context = Context {
@@ -301,7 +304,7 @@ fn held_out(
 ) -> Result<Vec<(verify::Customer, Shots)>, Vec<Diagnostic>> {
     (0..CUSTOMERS)
         .map(|index| {
-            let customer = verify::customer(model, &job.station.camera, index);
+            let customer = verify::customer(model, job.station, index);
             let camera = customer.installation.apply(&job.camera);
             // Another seed than training's: these draws must be new.
             let draws = Draws { seed: customer.seed, count: HELD_OUT_GOOD, faulty: HELD_OUT_FAULTY };

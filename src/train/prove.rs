@@ -51,7 +51,7 @@ pub fn prove(job: &Job, model: &Model, trials: Trials, observer: &Observer) -> R
     let (mut judged, mut unfit) = (Vec::new(), 0);
     let mut sizes = Sizes::new(&plan);
     for index in 0..customers {
-        let customer = verify::customer(model, &job.station.camera, FIRST_CUSTOMER + u64::from(index));
+        let customer = verify::customer(model, job.station, FIRST_CUSTOMER + u64::from(index));
         let camera = customer.installation.apply(&job.camera);
         let draws = Draws { seed: customer.seed, count: goods, faulty: faults };
         let progress = |i: usize, n: usize| observer(Step::HeldOut, index as usize * n + i, customers as usize * n);

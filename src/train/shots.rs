@@ -33,6 +33,8 @@ pub struct Drawn {
     pub finishes: Vec<Finish>,
     pub ground: Option<Finish>,
     pub standing: Pose,
+    /// Standard deviation of the photo's point spread (px of the photo).
+    pub blur: f64,
 }
 
 /// The assembly at nominal, in the middle of its standing ranges.
@@ -45,6 +47,7 @@ pub fn nominal(design: &Design, station: &Station) -> Result<Drawn, Vec<Diagnost
         finishes: design.components.iter().map(|c| finish(design.parts[c.part].material)).collect(),
         ground: station.floor.as_ref().map(|f| finish(f.material)),
         standing: Pose::from_array(standing(station).map(|[low, high]| (low + high) / 2.0)),
+        blur: station.camera.blur.range.nominal,
     })
 }
 
@@ -59,6 +62,7 @@ pub fn draw(design: &Design, station: &Station, seed: u64, image: u64) -> Result
         finishes: design.components.iter().enumerate().map(|(i, c)| finish(i, design.parts[c.part].material)).collect(),
         ground: station.floor.as_ref().map(|f| finish(FLOOR, f.material)),
         standing: Pose::from_array(standing(station).map(|[low, high]| stream.between(low, high))),
+        blur: station.camera.blur.at(Stream::new(seed, "blur", image).uniform()),
     })
 }
 
@@ -127,8 +131,8 @@ pub struct Setup<'a> {
     pub camera: Camera,
     pub lamps: Vec<Lamp>,
     pub samples: u32,
-    /// Point spread in px of the shots.
-    pub blur: f64,
+    /// px of the photo per px of the shots.
+    pub base: u32,
 }
 
 /// A correct shot before the lens blurs it, with what the camera sees: what faulty shots of the same draw are made from.
@@ -194,9 +198,10 @@ fn overlay(images: &mut LightImages, base: &LightImages, only: &[bool]) {
 /// Lens and frame: from rendered pixels to the full image.
 fn develop(setup: &Setup, drawn: &Drawn, images: &LightImages) -> Shot {
     let [width, height] = images.size().map(|s| s as usize);
+    let blur = drawn.blur / f64::from(setup.base);
     let grid = |group: &Vec<f32>| {
         let mut values = group.clone();
-        render::sensor::blur(&mut values, width, height, setup.blur as f32);
+        render::sensor::blur(&mut values, width, height, blur as f32);
         framed(Grid::new(width, height, values), images.crop, setup.camera.size)
     };
     Shot { pose: drawn.standing, lamps: images.groups.iter().map(grid).collect() }

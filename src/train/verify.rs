@@ -4,13 +4,14 @@
 //! imagined installed with an error, lit by lamps of other powers, and calibrated with one photo, as a customer would.
 
 use super::edges;
+use super::exposing::Exposing;
 use super::plan::Plan;
 use super::shots::Shot;
 use super::stats::{rate, rounded};
 use super::synthesise::{FaultyShot, Shots};
 use super::thresholds;
 use crate::assembly::fault::ErrorMode;
-use crate::design::model::{CameraSpec, Design};
+use crate::design::model::{Design, Station};
 use crate::rng::Stream;
 use crate::runtime::calibrate::{self, Calibration};
 use crate::runtime::camera::let_through;
@@ -55,10 +56,12 @@ pub struct Customer {
     pub full_well: f64,
     /// The largest grey value.
     pub deepest: f64,
+    exposing: Exposing,
 }
 
 /// Customer number `index`.
-pub fn customer(model: &Model, spec: &CameraSpec, index: u64) -> Customer {
+pub fn customer(model: &Model, station: &Station, index: u64) -> Customer {
+    let spec = &station.camera;
     let mut stream = Stream::new(model.seed, "customer", index);
     let install = &model.station.install;
     let mut within = |half: f64| stream.between(-half, half);
@@ -79,6 +82,7 @@ pub fn customer(model: &Model, spec: &CameraSpec, index: u64) -> Customer {
         vignetting: spec.vignetting.at(Stream::new(model.seed, "lens", index).uniform()),
         full_well: spec.full_well,
         deepest: f64::from((1_u32 << spec.depth.min(16)) - 1),
+        exposing: Exposing::new(station),
     }
 }
 
@@ -96,13 +100,11 @@ impl Customer {
 pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, index: u64) -> Photo {
     let mut stream = Stream::new(customer.seed, "photo", index);
     let open = inspect::light(model, &customer.powers).is_open();
+    let exposing = &customer.exposing;
+    let factor = exposing.factor(customer.seed, index);
     let mut drifted = |(&power, lamp): (&f64, &Lamp)| {
-        let u = stream.uniform();
-        if open {
-            within(&range(power, lamp.drift), u)
-        } else {
-            (power * (1.0 + lamp.drift * (2.0 * u - 1.0))).max(0.0)
-        }
+        let (u, drift) = (stream.uniform(), exposing.drift_of(lamp));
+        if open { within(&range(power, drift), u) } else { (power * factor * (1.0 + drift * (2.0 * u - 1.0))).max(0.0) }
     };
     let weights: Vec<f64> = customer.powers.iter().zip(&model.station.lamps).map(&mut drifted).collect();
     let mut light = Grid::filled(lamps[0].width, lamps[0].height, 0.0);
@@ -111,7 +113,9 @@ pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, inde
     }
     if open {
         let bright = edges::quantile(&light, |_| true, EXPOSED_QUANTILE).max(f32::MIN_POSITIVE);
-        let gain = stream.between(EXPOSURES[0], EXPOSURES[1]) as f32 / bright;
+        let usual = stream.between(EXPOSURES[0], EXPOSURES[1]);
+        let exposed_to = exposing.metered((EXPOSURES[0] + EXPOSURES[1]) / 2.0, factor).unwrap_or(usual);
+        let gain = exposed_to as f32 / bright;
         light.values.iter_mut().for_each(|v| *v *= gain);
     }
     let size = model.station.camera.size;

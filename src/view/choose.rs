@@ -134,7 +134,7 @@ pub fn keep(design: &Design, station: &Station, bodies: &[Body], targets: &[Targ
 pub(super) fn chosen(design: &Design, station: &Station, bodies: &[Body], table: Vec<Scored>, best: usize) -> Choice {
     let camera = build::camera(&station.camera, table[best].placing);
     let grid = PixelGrid::of(&camera);
-    let seen = seen_on_grid(bodies, &camera, &ItemBuffer::on_grid(bodies, &camera, &grid), &grid);
+    let seen = seen_on_grid(bodies, &camera, &grid);
     // From inside of a part nothing is seen; one mistake is one diagnostic.
     let mut diagnostics = match blocked::camera(design, station, bodies, &camera) {
         Some(fault) => vec![fault],

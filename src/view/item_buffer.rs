@@ -5,10 +5,12 @@
 
 use super::raster::Canvas;
 pub use super::raster::PixelGrid;
-pub(super) use super::raster::Stamps;
+use super::raster::Stamps;
 use crate::runtime::camera::{Camera, Vec3, dot};
 use crate::scene::Body;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// What a camera sees, row by row from the top left pixel.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,15 +78,46 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    pub(super) fn of(body: &Body, camera: &Camera, stamps: &mut Stamps) -> Footprint {
-        let (width, mut footprint) = (camera.size[0] as usize, Footprint::default());
-        stamps.cover(body, camera, |i| {
-            let (x, y) = ((i % width) as u32, (i / width) as u32);
-            let pixel = PixelBox { x0: x, y0: y, x1: x + 1, y1: y + 1 };
-            footprint.frame = Some(footprint.frame.map_or(pixel, |frame| frame.around(&pixel)));
-            footprint.pixels += 1;
-        });
-        footprint
+    fn add(&mut self, pixel: usize, width: usize) {
+        let (x, y) = ((pixel % width) as u32, (pixel / width) as u32);
+        *self = self.and(&Footprint { frame: Some(PixelBox { x0: x, y0: y, x1: x + 1, y1: y + 1 }), pixels: 1 });
+    }
+
+    /// Of both, which have no pixel in common.
+    fn and(&self, other: &Footprint) -> Footprint {
+        let frame = match (self.frame, other.frame) {
+            (Some(a), Some(b)) => Some(a.around(&b)),
+            (a, b) => a.or(b),
+        };
+        Footprint { frame, pixels: self.pixels + other.pixels }
+    }
+}
+
+/// A band of rows, drawn, with what each body covers of it.
+struct Band {
+    id: Vec<u32>,
+    face: Vec<u32>,
+    depth: Vec<f32>,
+    alone: Vec<Footprint>,
+}
+
+impl Band {
+    fn of(bodies: &[Body], camera: &Camera, grid: &PixelGrid, rows: Range<usize>) -> Band {
+        let mut stamps = Stamps::new(grid, &rows);
+        let mut canvas = Canvas::new(grid, rows);
+        let mut look = |body: &Body| {
+            let mut alone = Footprint::default();
+            stamps.next_body();
+            canvas.draw(body, camera, |pixel| {
+                if stamps.is_new(pixel) {
+                    alone.add(pixel, grid.width);
+                }
+            });
+            alone
+        };
+        let alone = bodies.iter().map(&mut look).collect();
+        let depth = canvas.depth.iter().map(|&z| z as f32).collect();
+        Band { id: canvas.id, face: canvas.face, depth, alone }
     }
 }
 
@@ -96,9 +129,9 @@ impl ItemBuffer {
 
     /// The same with a grid made before by [`PixelGrid::of`] a camera of the same focal length, centre, k1, k2 and size.
     pub fn on_grid(bodies: &[Body], camera: &Camera, grid: &PixelGrid) -> ItemBuffer {
-        let mut canvas = Canvas::new(grid);
+        let mut canvas = Canvas::new(grid, 0..grid.height);
         for body in bodies {
-            canvas.draw(body, camera);
+            canvas.draw(body, camera, |_| {});
         }
         ItemBuffer {
             width: grid.width,
@@ -107,6 +140,27 @@ impl ItemBuffer {
             id: canvas.id,
             face: canvas.face,
         }
+    }
+
+    /// The same, with what each body covers as if it stood alone. Bands of rows are drawn on all threads; what is seen in a row
+    /// does not depend on how the rows are shared.
+    pub(super) fn with_footprints(bodies: &[Body], camera: &Camera, grid: &PixelGrid) -> (ItemBuffer, Vec<Footprint>) {
+        /// More bands than this cost more in triangles that are set up once in each than they share.
+        const MOST_BANDS: usize = 4;
+        let count = rayon::current_num_threads().clamp(1, MOST_BANDS);
+        let row = |k: usize| grid.height * k / count;
+        let bands: Vec<Band> =
+            (0..count).into_par_iter().map(|k| Band::of(bodies, camera, grid, row(k)..row(k + 1))).collect();
+        let covered = |i: usize| bands.iter().fold(Footprint::default(), |all, band| all.and(&band.alone[i]));
+        let alone = (0..bodies.len()).map(covered).collect();
+        let buffer = ItemBuffer {
+            width: grid.width,
+            height: grid.height,
+            id: bands.iter().flat_map(|band| &band.id).copied().collect(),
+            face: bands.iter().flat_map(|band| &band.face).copied().collect(),
+            depth: bands.iter().flat_map(|band| &band.depth).copied().collect(),
+        };
+        (buffer, alone)
     }
 
     /// Pixels of every (component, face) that is seen at all.
@@ -337,6 +391,24 @@ mod tests {
             assert!((0..mask.bits.len()).all(|i| !mask.bits[i] || inside(i)));
         }
         assert_eq!(buffer.bbox(9), None);
+    }
+
+    #[test]
+    fn bands_of_rows_are_the_whole_on_any_number_of_threads() {
+        let (camera, bodies) = (oblique(-0.05), assembly());
+        let whole = ItemBuffer::of(&bodies, &camera);
+        let alone = |body: &Body| {
+            let buffer = ItemBuffer::of(std::slice::from_ref(body), &camera);
+            Footprint { frame: buffer.bbox(body.component), pixels: buffer.pixels(body.component) }
+        };
+        let footprints: Vec<Footprint> = bodies.iter().map(alone).collect();
+        assert!(footprints.iter().any(|f| f.frame.is_some_and(|frame| frame.y1 - frame.y0 > 60)), "across the bands");
+        let grid = PixelGrid::of(&camera);
+        for threads in [1, 2, 3, 7] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let (buffer, found) = pool.install(|| ItemBuffer::with_footprints(&bodies, &camera, &grid));
+            assert!(buffer == whole && found == footprints, "{threads} threads");
+        }
     }
 
     #[test]

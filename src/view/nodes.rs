@@ -3,10 +3,9 @@
 //!
 //! In: bodies, a camera and its [`ItemBuffer`]. Out: one [`Seen`] per body; masks. Never decides what a node is.
 
-use super::item_buffer::{Footprint, ItemBuffer, Mask, PixelBox, PixelGrid, Stamps};
+use super::item_buffer::{Footprint, ItemBuffer, Mask, PixelBox, PixelGrid};
 use crate::runtime::camera::Camera;
 use crate::scene::Body;
-use rayon::prelude::*;
 
 /// Difference in depth (mm) from which a pixel counts as changed: below what a step of a face would have to be to be
 /// seen at all, above the play of a good fit.
@@ -26,16 +25,16 @@ pub struct Seen {
     pub faces: Vec<(u32, u32)>,
 }
 
-/// What `camera` sees of each body; `buffer` is its item buffer of all of them.
-pub fn seen(bodies: &[Body], camera: &Camera, buffer: &ItemBuffer) -> Vec<Seen> {
-    seen_on_grid(bodies, camera, buffer, &PixelGrid::of(camera))
+/// What `camera` sees of each body.
+pub fn seen(bodies: &[Body], camera: &Camera) -> Vec<Seen> {
+    seen_on_grid(bodies, camera, &PixelGrid::of(camera))
 }
 
 /// The same with a grid made before by [`PixelGrid::of`] the camera.
-pub(super) fn seen_on_grid(bodies: &[Body], camera: &Camera, buffer: &ItemBuffer, grid: &PixelGrid) -> Vec<Seen> {
+pub(super) fn seen_on_grid(bodies: &[Body], camera: &Camera, grid: &PixelGrid) -> Vec<Seen> {
+    let (buffer, alone) = ItemBuffer::with_footprints(bodies, camera, grid);
     let (counts, boxes) = (buffer.counts(), buffer.boxes());
-    let look = |stamps: &mut Stamps, body: &Body| {
-        let alone = Footprint::of(body, camera, stamps);
+    let look = |(body, alone): (&Body, Footprint)| {
         let own = counts.range((body.component, 0)..=(body.component, u32::MAX));
         let faces: Vec<(u32, u32)> = own.map(|(&(_, face), &pixels)| (face, pixels)).collect();
         Seen {
@@ -47,7 +46,7 @@ pub(super) fn seen_on_grid(bodies: &[Body], camera: &Camera, buffer: &ItemBuffer
             faces,
         }
     };
-    bodies.par_iter().map_init(|| Stamps::new(grid), look).collect()
+    bodies.iter().zip(alone).map(look).collect()
 }
 
 /// Visible pixels of the components asked for; 0 for one that has no body.
@@ -109,8 +108,7 @@ mod tests {
     #[test]
     fn the_full_box_ignores_what_hides_the_part_and_the_visible_box_does_not() {
         let (bodies, camera) = half_hidden();
-        let buffer = ItemBuffer::of(&bodies, &camera);
-        let post = &seen(&bodies, &camera, &buffer)[1];
+        let post = &seen(&bodies, &camera)[1];
         let (full, visible) = (post.full.unwrap(), post.visible.unwrap());
         // The post's top, 4 mm at 385 mm, is 10.4 px wide: 10 pixel centres.
         assert_eq!([full.x0, full.x1, full.y0, full.y1], [75, 85, 55, 65]);
@@ -122,7 +120,7 @@ mod tests {
     #[test]
     fn counts_are_reported_for_the_components_asked_for() {
         let (bodies, camera) = half_hidden();
-        let seen = seen(&bodies, &camera, &ItemBuffer::of(&bodies, &camera));
+        let seen = seen(&bodies, &camera);
         let pixels = visible_pixels(&seen, &[1, 7, 2]);
         assert_eq!(pixels[..2], [50, 0]);
         assert_eq!(pixels[2], seen[2].full_pixels);

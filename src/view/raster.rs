@@ -154,61 +154,72 @@ fn undistorted(k: f64, q: f64) -> f64 {
     t
 }
 
-/// The buffer while it is drawn: items are (1 + component, face), depth in mm.
+/// A band of rows of the buffer while it is drawn, pixels counted from its first: items are (1 + component, face), depth in mm.
 pub(super) struct Canvas<'a> {
     grid: &'a PixelGrid,
+    band: Range<usize>,
     pub(super) id: Vec<u32>,
     pub(super) face: Vec<u32>,
     pub(super) depth: Vec<f64>,
 }
 
 impl<'a> Canvas<'a> {
-    pub(super) fn new(grid: &'a PixelGrid) -> Self {
-        let pixels = grid.width * grid.height;
-        Canvas { grid, id: vec![0; pixels], face: vec![0; pixels], depth: vec![f64::INFINITY; pixels] }
+    pub(super) fn new(grid: &'a PixelGrid, band: Range<usize>) -> Self {
+        let pixels = grid.width * band.len();
+        Canvas { grid, band, id: vec![0; pixels], face: vec![0; pixels], depth: vec![f64::INFINITY; pixels] }
     }
 
-    pub(super) fn draw(&mut self, body: &Body, camera: &Camera) {
-        let id = 1 + body.component as u32;
-        scan(self.grid, body, camera, |i, depth, face| {
+    /// Draws a body and calls `met` with every pixel (of the image) that a triangle of it meets, hidden or not, as often as
+    /// one does.
+    pub(super) fn draw(&mut self, body: &Body, camera: &Camera, mut met: impl FnMut(usize)) {
+        let (id, first) = (1 + body.component as u32, self.band.start * self.grid.width);
+        scan(self.grid, self.band.clone(), body, camera, |pixel, depth, face| {
+            let i = pixel - first;
             if in_front((depth, [id, face]), (self.depth[i], [self.id[i], self.face[i]])) {
                 (self.depth[i], self.id[i], self.face[i]) = (depth, id, face);
+            }
+            if depth.is_finite() {
+                met(pixel);
             }
         });
     }
 }
 
-/// Which pixels single bodies cover, one body after the other: a pixel is never cleared, it only remembers the last body.
-pub(super) struct Stamps<'a> {
-    grid: &'a PixelGrid,
+/// Which pixels of a band single bodies cover, one body after the other: a pixel is never cleared, it only remembers the last
+/// body.
+pub(super) struct Stamps {
+    first: usize,
     last: Vec<u32>,
     bodies: u32,
 }
 
-impl<'a> Stamps<'a> {
-    pub(super) fn new(grid: &'a PixelGrid) -> Self {
-        Stamps { grid, last: vec![0; grid.width * grid.height], bodies: 0 }
+impl Stamps {
+    pub(super) fn new(grid: &PixelGrid, band: &Range<usize>) -> Self {
+        Stamps { first: band.start * grid.width, last: vec![0; grid.width * band.len()], bodies: 0 }
     }
 
-    /// Calls `visit` with the pixels the body covers as if it stood alone, each once.
-    pub(super) fn cover(&mut self, body: &Body, camera: &Camera, mut visit: impl FnMut(usize)) {
+    /// From here on pixels are another body's.
+    pub(super) fn next_body(&mut self) {
         self.bodies += 1;
-        scan(self.grid, body, camera, |i, depth, _| {
-            if depth.is_finite() && self.last[i] != self.bodies {
-                self.last[i] = self.bodies;
-                visit(i);
-            }
-        });
+    }
+
+    /// Whether the body meets this pixel (of the image) for the first time.
+    pub(super) fn is_new(&mut self, pixel: usize) -> bool {
+        let last = &mut self.last[pixel - self.first];
+        let is_new = *last != self.bodies;
+        *last = self.bodies;
+        is_new
     }
 }
 
-/// Calls `visit` with every pixel, depth and face where a triangle of the body faces the camera.
-fn scan(grid: &PixelGrid, body: &Body, camera: &Camera, mut visit: impl FnMut(usize, f64, u32)) {
+/// Calls `visit` with every pixel, depth and face where a triangle of the body faces the camera, in the rows of a band.
+fn scan(grid: &PixelGrid, band: Range<usize>, body: &Body, camera: &Camera, mut visit: impl FnMut(usize, f64, u32)) {
     let to_camera = to_camera(camera) * body.pose.to_matrix();
     let seen: Vec<Vec3> = body.mesh.positions.iter().map(|p| to_camera.transform_point(p).into()).collect();
     for (corners, &face) in body.mesh.triangles.iter().zip(&body.mesh.faces) {
         let Some(triangle) = Triangle::new(corners.map(|i| seen[i as usize])) else { continue };
-        for y in grid.rows(triangle.v) {
+        let rows = grid.rows(triangle.v);
+        for y in rows.start.max(band.start)..rows.end.min(band.end) {
             for i in grid.span(y, &triangle) {
                 if let Some(depth) = triangle.depth(grid.u[i], grid.v[i]) {
                     visit(i, depth, face);

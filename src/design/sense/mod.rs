@@ -20,6 +20,7 @@ use crate::iso;
 use crate::units::Range;
 use body::{Body, Leaf};
 use motion::{Motion, Nominal};
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A dimension of a part, the same in all its pieces.
@@ -61,7 +62,7 @@ impl Resolver {
         for part in parts {
             Body::of(part).leaves.iter().for_each(|leaf| self.leaf_uses(leaf, &mut values, &mut uses));
         }
-        self.motions(parts, &mut values, &mut uses);
+        self.motions(parts, &values, &mut uses);
         for (id, uses) in uses.into_iter().enumerate() {
             self.settle(id, uses);
         }
@@ -86,22 +87,31 @@ impl Resolver {
         }
     }
 
-    /// Asks the boundaries of parts about the dimensions that signs alone do not settle, once for all pieces of a part.
-    fn motions(&self, parts: &[Part], values: &mut [f64], uses: &mut [Uses]) {
-        let mut known: BTreeMap<&str, BTreeMap<Place, Motion>> = BTreeMap::new();
-        for part in parts {
+    /// Asks the boundaries of parts about the dimensions that signs alone do not settle, once for all pieces of a part, and of
+    /// all parts on all threads.
+    fn motions(&self, parts: &[Part], values: &[f64], uses: &mut [Uses]) {
+        let (mut asked, mut first, mut all) = (BTreeSet::new(), Vec::new(), Vec::new());
+        for (index, part) in parts.iter().enumerate() {
             let body = Body::of(part);
             let dims = body.leaves.iter().flat_map(|leaf| leaf.pose_dims().into_iter().chain(leaf.size_dims()));
             let open: BTreeSet<DimId> = dims.filter(|id| uses[id.0 as usize].unsettled()).collect();
-            let places = self.places(&open);
-            if !known.contains_key(part.name.as_str()) {
-                let nominal = Nominal::of(body, values, open.len());
-                let ask = |(place, id): (&Place, &DimId)| {
-                    (*place, nominal.motion(*id, self.dims[id.0 as usize].range.half_width(), values))
-                };
-                known.insert(&part.name, places.iter().zip(&open).map(ask).collect());
+            all.push((self.places(&open), open));
+            if asked.insert(part.name.as_str()) {
+                first.push((index, body));
             }
-            for (place, id) in places.iter().zip(&open) {
+        }
+        let widths: Vec<f64> = self.dims.iter().map(|dim| dim.range.half_width()).collect();
+        let answer = |values: &mut Vec<f64>, (index, body): (usize, Body)| {
+            let (places, open) = &all[index];
+            let nominal = Nominal::of(body, values, open.len());
+            let ask = |(place, id): (&Place, &DimId)| (*place, nominal.motion(*id, widths[id.0 as usize], values));
+            (parts[index].name.as_str(), places.iter().zip(open).map(ask).collect::<BTreeMap<Place, Motion>>())
+        };
+        let known: Vec<(&str, BTreeMap<Place, Motion>)> =
+            first.into_par_iter().map_init(|| values.to_vec(), answer).collect();
+        let known: BTreeMap<&str, BTreeMap<Place, Motion>> = known.into_iter().collect();
+        for (part, (places, open)) in parts.iter().zip(&all) {
+            for (place, id) in places.iter().zip(open) {
                 let Some(Motion { gained, lost }) = known[part.name.as_str()].get(place).cloned() else { continue };
                 let seen = &mut uses[id.0 as usize].motion;
                 seen.gained = seen.gained.take().or(gained);

@@ -257,9 +257,10 @@ impl Builder {
         }
     }
 
-    /// `M2.5`: one word, although a name holds no point.
+    /// `M2.5`, `M36 x 3`: one word, although a name holds neither points nor blanks.
     fn thread(&self, pair: &Node) -> Dim {
-        let (name, span) = (self.name(pair), self.span(pair));
+        let span = self.span(pair);
+        let name = Name { text: pair.as_str().replace(' ', ""), span };
         let path = Path { segments: vec![Segment { name, index: None }], span };
         Dim { size: Size::Path(path), tolerance: None, each: false, span }
     }

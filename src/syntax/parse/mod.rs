@@ -9,11 +9,12 @@ mod words;
 use super::ast::{File, Gap, Line};
 use super::faults::{self, Fault};
 use super::lines::strip_comment;
-use super::scan::{self, Scanned, scan};
+use super::scan::{self, Chunk, Scanned, scan};
 use super::{heads, letters};
 use crate::diag::{self, Diagnostic, Fix, Span};
 use build::Builder;
 use pest::Parser;
+use rayon::prelude::*;
 use std::borrow::Cow;
 use words::words;
 
@@ -45,11 +46,15 @@ pub fn parse(text: &str, file: u32) -> (File, Vec<Diagnostic>) {
     let mut tree = File { lost, ..File::default() };
     tree.lost.extend(scanned.lost.iter().map(|r| Span { file, start: r.start as u32, end: r.end as u32 }));
     let mut end = 0;
-    for chunk in &scanned.chunks {
+    for (chunk, sound) in scanned.chunks.iter().zip(sound_items(&clean, file, &scanned.chunks)) {
         let builder = Builder { file, offset: chunk.start };
         end = chunk.end;
         if chunk.broken || diagnostics.len() >= MAX_FAULTS {
             tree.lost.push(builder.whole(chunk.end - chunk.start));
+            continue;
+        }
+        if let Some(line) = sound {
+            tree.lines.push(line);
             continue;
         }
         tree.lines.extend(parse_chunk(&clean[chunk.start..chunk.end], &builder, &mut diagnostics, &mut tree.lost));
@@ -58,6 +63,21 @@ pub fn parse(text: &str, file: u32) -> (File, Vec<Diagnostic>) {
     diagnostics.sort_by_key(|d| d.labels[0].span.start);
     diagnostics.truncate(MAX_FAULTS);
     (tree, diagnostics)
+}
+
+/// The items that parse as they stand, on all threads where there are many; nothing in the place of the others.
+fn sound_items(text: &str, file: u32, chunks: &[Chunk]) -> Vec<Option<Line>> {
+    /// Fewer items than this are read sooner than threads are woken.
+    const MANY: usize = 64;
+    let read = |chunk: &Chunk| {
+        let mut pairs = Grammar::parse(Rule::chunk, text.get(chunk.start..chunk.end)?).ok()?;
+        Builder { file, offset: chunk.start }.lines(pairs.next()?).0.pop()
+    };
+    let sound = |chunk: &Chunk| if chunk.broken { None } else { read(chunk) };
+    match chunks.len() {
+        0..MANY => chunks.iter().map(sound).collect(),
+        _ => chunks.par_iter().map(sound).collect(),
+    }
 }
 
 /// Whether an item parses as it stands.

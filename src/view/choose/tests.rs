@@ -3,7 +3,7 @@
 use super::super::shapes::{block, body, placed};
 use super::*;
 use crate::design::model::{
-    CameraSpec, Component, Floor, Inspect, LightShape, LightSpec, PoseExpr, Response, Train, Watch,
+    CameraSpec, Component, Floor, Inspect, LightShape, LightSpec, PerPhoto, PoseExpr, Response, Train, Watch,
 };
 use crate::diag::Span;
 
@@ -21,7 +21,7 @@ fn station(placing: CameraPlacing) -> Station {
         depth: 8,
         install_mm: 0.0,
         install_rad: 0.0,
-        blur: Range::exactly(0.5),
+        blur: PerPhoto::exactly(0.5),
         response: Response::Linear,
         span: Span::default(),
     };
@@ -34,7 +34,7 @@ fn station(placing: CameraPlacing) -> Station {
         y: Range::symmetric(0.0, 3.0),
         z: Range::exactly(0.0),
         rz: Range::symmetric(0.0, 0.1),
-        exposure: Range::exactly(1.0),
+        exposure: PerPhoto::exactly(1.0),
         noise: 0.0,
         span: Span::default(),
     }
