@@ -9,7 +9,7 @@ use crate::runtime::model::Node;
 
 /// Share of the lowest goods and the highest faults left out when asking whether they overlap: photos in which the pose
 /// went wrong, which say nothing about the node.
-const TRIM: f64 = 0.1;
+pub(super) const TRIM: f64 = 0.1;
 
 /// What the held-out renders showed of one node: per render the ratio against each hypothesis.
 pub struct Seen {
@@ -44,7 +44,7 @@ fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
 /// lie apart but below zero, the middle between them; what is more likely good is never rejected. Where their bulk overlaps,
 /// no threshold is right: the promised rate of false rejects is kept by the middle and the spread of the goods, and what
 /// escapes is counted. Never a quantile of the goods: their few lowest scores say nothing about a photo's.
-fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
+pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
     if good.is_empty() || fault.is_empty() {
         return 0.0;
     }
@@ -61,7 +61,7 @@ fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
 }
 
 /// The value below which a share of ascending values lies.
-fn at_share(sorted: &[f64], share: f64) -> f64 {
+pub(super) fn at_share(sorted: &[f64], share: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * share).round() as usize]
 }
 
