@@ -82,9 +82,10 @@ impl Build {
         let out = out.ok_or_else(|| Failed("OUT_DIR is not set: this is for build scripts".into()))?;
         let (compiled, lines) = self.made(Artifact::Model, Some(&out.join("gonogo-cache")))?;
         lines.iter().for_each(|line| println!("{line}"));
-        let Some(model) = compiled.model.filter(|_| !stopped(&compiled.diagnostics)) else { return Err(self.failed()) };
+        let text = compiled.model.map(|model| model.write()).or_else(|| compiled.rig.map(|rig| rig.write()));
+        let Some(text) = text.filter(|_| !stopped(&compiled.diagnostics)) else { return Err(self.failed()) };
         let path = out.join(self.file());
-        write(&path, &model.write()).map_err(|e| Failed(format!("cannot write `{}`: {e}", path.display())))?;
+        write(&path, &text).map_err(|e| Failed(format!("cannot write `{}`: {e}", path.display())))?;
         Ok(path)
     }
 

@@ -106,9 +106,11 @@ pub fn prove(
     let mut line = line::Line::new(&options, observer);
     if let Some(ready) = ready(spec, read, &mut line) {
         // Renders that are to be fresh are neither kept nor found.
-        let job = ready.job(None);
-        if job.spec == model.spec {
-            let proof = train::prove::prove(&job, model, trials, &|step, i, n| line.tell(step.into(), i, n));
+        let jobs = ready.jobs(None);
+        if let [job] = &jobs[..]
+            && job.spec == model.spec
+        {
+            let proof = train::prove::prove(job, model, trials, &|step, i, n| line.tell(step.into(), i, n));
             line.out.proof = line.accept(proof);
         }
     }
@@ -119,10 +121,22 @@ pub fn prove(
 #[cfg(feature = "compile")]
 fn run(spec: &str, read: design::Read, line: &mut line::Line) -> Option<()> {
     let ready = ready(spec, read, line)?;
-    let job = ready.job(line.options.cache.as_deref());
-    let trained = train::train(&job, &|step, done, total| line.tell(step.into(), done, total));
-    let (model, doubts) = line.accept(trained)?;
-    line.out.model = Some(model);
+    let jobs = ready.jobs(line.options.cache.as_deref());
+    let tell = |step: train::Step, done, total| line.tell(step.into(), done, total);
+    let doubts = match &jobs[..] {
+        [job] => {
+            let trained = train::train(job, &tell);
+            let (model, doubts) = line.accept(trained)?;
+            line.out.model = Some(model);
+            doubts
+        }
+        jobs => {
+            let trained = train::rig::train(jobs, &tell);
+            let (rig, doubts) = line.accept(trained)?;
+            line.out.rig = Some(rig);
+            doubts
+        }
+    };
     line.check(((), doubts))
 }
 
@@ -132,9 +146,8 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
     line.enter(Stage::Design)?;
     let design = line.loaded(design::load(spec, read, &line.options.set))?;
     line.keep(|made| (made.digest, made.design) = (line::digest(&design), Some(design.clone())));
-    let index = line.accept(line::station(&design, line.options.station.as_deref()))?;
-    let station = &design.stations[index];
-    line.keep(|made| made.station = index);
+    let stations = line.accept(line::stations(&design, line.options.station.as_deref()))?;
+    line.keep(|made| made.station = stations[0]);
     line.emit(Artifact::Design, || artifacts::design(&design));
 
     line.enter(Stage::Solid)?;
@@ -155,27 +168,42 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
     line.emit_assembly(&design, &solids, &analysis);
 
     line.enter(Stage::View)?;
-    let bodies = line::bodies(&design, station, &solids);
+    let bodies = line::bodies(&design, &design.stations[stations[0]], &solids);
     let targets = view::choose::targets(&assembly::error_tree::levels(&design, &analysis.liaison));
-    let kept = line.kept_choice(&design, station)?;
-    let weighs = view::lock::is_auto(station) && (kept.is_none() || line.options.keep);
-    let task = view::escape::Task {
-        design: &design,
-        station,
-        bodies: &bodies,
-        targets: &targets,
-        modes: &if weighs { modes() } else { Vec::new() },
-        solids: &solids,
-    };
-    let choice = line::choice(line.options.keep, kept, &task);
-    line.keep(|made| (made.bodies, made.choice) = (bodies.clone(), Some(choice.clone())));
-    let camera = line.check((choice.camera, choice.diagnostics.clone()))?;
-    line.lock(&design, station, &choice);
-    line.emit(Artifact::View, || artifacts::view(&design, station, &choice));
-    line.emit_files(Artifact::Images, || artifacts::images::pictures(&design, station, &camera, &modes()));
+    line.keep(|made| made.bodies = bodies.clone());
+    let (mut cameras, mut found) = (Vec::new(), Vec::new());
+    for index in stations {
+        let station = &design.stations[index];
+        let kept = line.kept_choice(&design, station)?;
+        let weighs = view::lock::is_auto(station) && (kept.is_none() || line.options.keep);
+        let task = view::escape::Task {
+            design: &design,
+            station,
+            bodies: &bodies,
+            targets: &targets,
+            modes: &if weighs { modes() } else { Vec::new() },
+            solids: &solids,
+        };
+        let choice = line::choice(line.options.keep, kept, &task);
+        line.keep(|made| made.chosen(index, &choice));
+        cameras.push((index, choice));
+        found.push(cameras.last().map(|(_, choice)| choice.diagnostics.clone()).unwrap_or_default());
+    }
+    line.check(((), line::seen_by_none(found)))?;
+    for (index, choice) in &cameras {
+        let station = &design.stations[*index];
+        line.lock(&design, station, choice);
+        line.emit_of_camera(station, |line| {
+            line.emit(Artifact::View, || artifacts::view(&design, station, choice));
+            line.emit_files(Artifact::Images, || {
+                artifacts::images::pictures(&design, station, &choice.camera, &modes())
+            });
+        });
+    }
+    let cameras = cameras.into_iter().map(|(index, choice)| (index, choice.camera)).collect();
 
     line.enter(Stage::Plan)?;
     let modes = modes();
     let tree = assembly::error_tree::error_tree(&analysis.liaison, 0, None);
-    Some(line::Ready { station: index, camera, modes, liaison: analysis.liaison, tree, design })
+    Some(line::Ready { cameras, modes, liaison: analysis.liaison, tree, design })
 }

@@ -15,6 +15,7 @@ use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Sources};
 use crate::runtime::camera::Camera;
 use crate::runtime::model::Model;
+use crate::runtime::rig::Rig;
 use crate::scene::Body;
 use crate::scene::build::{self, Instance, Placed};
 use crate::solid::{Quality, Solid};
@@ -53,6 +54,8 @@ pub struct Options {
 pub struct Compiled {
     /// Only if it was asked for and nothing is wrong.
     pub model: Option<Model>,
+    /// The same of a station with several cameras; then there is no `model`.
+    pub rig: Option<Rig>,
     /// Files by name: `view.ron`, `images/good.png`.
     pub artifacts: BTreeMap<String, Vec<u8>>,
     pub diagnostics: Vec<Diagnostic>,
@@ -83,7 +86,19 @@ pub struct Made {
     /// The nominal assembly in the middle of where it may stand.
     pub bodies: Vec<Body>,
     pub choice: Option<Choice>,
+    /// Where the station has several cameras, the stations and choices of the others.
+    pub others: Vec<(usize, Choice)>,
     pub modes: Vec<ErrorMode>,
+}
+
+impl Made {
+    /// Keeps the choice of one camera.
+    pub(crate) fn chosen(&mut self, station: usize, choice: &Choice) {
+        match self.choice {
+            None => self.choice = Some(choice.clone()),
+            Some(_) => self.others.push((station, choice.clone())),
+        }
+    }
 }
 
 /// The stages as progress tells them, in running order.
@@ -155,26 +170,28 @@ pub type Observer<'a> = dyn Fn(Progress) + Sync + 'a;
 /// All that training or a proof starts from.
 pub(crate) struct Ready {
     pub design: Design,
-    /// Index into [`Design::stations`].
-    pub station: usize,
-    pub camera: Camera,
+    /// For each camera its station, an index into [`Design::stations`].
+    pub cameras: Vec<(usize, Camera)>,
     pub modes: Vec<ErrorMode>,
     pub liaison: Liaison,
     pub tree: ErrorTree,
 }
 
 impl Ready {
-    pub fn job<'a>(&'a self, cache: Option<&'a dyn Cache>) -> Job<'a> {
-        Job {
+    /// One job a camera.
+    pub fn jobs<'a>(&'a self, cache: Option<&'a dyn Cache>) -> Vec<Job<'a>> {
+        let spec = digest(&self.design);
+        let job = |&(station, camera): &(usize, Camera)| Job {
             design: &self.design,
-            station: &self.design.stations[self.station],
-            camera: self.camera,
+            station: &self.design.stations[station],
+            camera,
             modes: &self.modes,
             liaison: &self.liaison,
             tree: &self.tree,
-            spec: digest(&self.design),
+            spec: spec.clone(),
             cache,
-        }
+        };
+        self.cameras.iter().map(job).collect()
     }
 }
 
@@ -233,7 +250,8 @@ impl<'a> Line<'a> {
         if lock::is_auto(station) {
             let locked = Locked::new(design, station, choice.table[choice.best].placing);
             let entry = lock::entry(station, &self.options.set);
-            self.out.lock = Some(self.options.lock.clone().unwrap_or_default().with(design, entry, locked));
+            let before = self.out.lock.take().or_else(|| self.options.lock.clone());
+            self.out.lock = Some(before.unwrap_or_default().with(design, entry, locked));
         }
     }
 
@@ -249,6 +267,18 @@ impl<'a> Line<'a> {
         if self.options.wanted.contains(&artifact) {
             self.out.artifacts.insert(artifact.file(), text().into_bytes());
         }
+    }
+
+    /// Names what the camera of a rig gave after it: `view.ron` becomes `top.view.ron`, `images/good.png` `images/top/good.png`.
+    pub fn emit_of_camera(&mut self, station: &Station, emit: impl FnOnce(&mut Self)) {
+        let Some((_, camera)) = station.in_rig() else { return emit(self) };
+        let before = std::mem::take(&mut self.out.artifacts);
+        emit(self);
+        let own = std::mem::replace(&mut self.out.artifacts, before);
+        self.out.artifacts.extend(own.into_iter().map(|(name, bytes)| {
+            let named = name.split_once('/').map(|(folder, file)| format!("{folder}/{camera}/{file}"));
+            (named.unwrap_or_else(|| format!("{camera}.{name}")), bytes)
+        }));
     }
 
     pub fn emit_assembly(&mut self, design: &Design, solids: &[Arc<Solid>], analysis: &Analysis) {
@@ -285,14 +315,33 @@ pub(crate) fn choice(shows_all: bool, kept: Option<Placed>, task: &escape::Task)
     }
 }
 
-/// The station of that name, or the first: an index into [`Design::stations`].
-pub(crate) fn station(design: &Design, name: Option<&str>) -> Result<usize, Vec<Diagnostic>> {
-    let wanted = |s: &Station| name.is_none_or(|n| s.name == n);
-    design.stations.iter().position(wanted).ok_or_else(|| vec![no_station(design, name.unwrap_or_default())])
+/// The cameras of the station of that name, or of the first: indices into [`Design::stations`]. `line.top` names one camera
+/// of several.
+pub(crate) fn stations(design: &Design, name: Option<&str>) -> Result<Vec<usize>, Vec<Diagnostic>> {
+    let first = design.stations.first().map(Station::place_name);
+    let name = name.or(first).unwrap_or_default();
+    let all = |wanted: &dyn Fn(&Station) -> bool| -> Vec<usize> {
+        (0..design.stations.len()).filter(|&i| wanted(&design.stations[i])).collect()
+    };
+    let found = all(&|s| s.place_name() == name);
+    let found = if found.is_empty() { all(&|s| s.name == name) } else { found };
+    if found.is_empty() { Err(vec![no_station(design, name)]) } else { Ok(found) }
+}
+
+/// A component that one camera does not see is no fault where another does.
+pub(crate) fn seen_by_none(mut cameras: Vec<Vec<Diagnostic>>) -> Vec<Diagnostic> {
+    const UNSEEN: &str = "E0601";
+    let component = |d: &Diagnostic| (d.code == UNSEEN).then(|| d.labels.get(1).map(|l| l.span)).flatten();
+    let unseen = |of: &Vec<Diagnostic>| -> Vec<_> { of.iter().filter_map(component).collect() };
+    let by_camera: Vec<_> = cameras.iter().map(unseen).collect();
+    let by_all = |d: &Diagnostic| component(d).is_none_or(|c| by_camera.iter().all(|unseen| unseen.contains(&c)));
+    cameras.iter_mut().for_each(|found| found.retain(by_all));
+    cameras.into_iter().flatten().collect()
 }
 
 fn no_station(design: &Design, name: &str) -> Diagnostic {
-    let names: Vec<&str> = design.stations.iter().map(|s| s.name.as_str()).collect();
+    let mut names: Vec<&str> = design.stations.iter().map(Station::place_name).collect();
+    names.dedup();
     let span = design.stations.first().map(|s| s.span).unwrap_or_default();
     let fault = Diagnostic::error("E0201", span, format!("no station `{name}`"))
         .label("the stations begin here")

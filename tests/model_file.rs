@@ -5,6 +5,7 @@
 
 use gonogo::runtime::calibrate::Calibration;
 use gonogo::runtime::model::Model;
+use gonogo::runtime::rig::{Component, Mode, Rig, RigCalibration, Seen};
 use ron_value::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -153,11 +154,14 @@ fn a_reader_written_from_the_page_reads_what_the_library_reads() {
         assert_eq!(window.items().iter().flat_map(light).collect::<Vec<f32>>(), grid.values);
     }
 
-    // Every record of the page is met in these two files.
+    reads_a_rig(&model, &calibration, &tables);
+
+    // Every record of the page is met in these files.
     let met = ["Model", "Station", "Camera", "Install", "Lamp", "Promise", "Rate", "ModeRate", "Locator", "PointGroup"];
     let more =
         ["PointSet", "Node", "Hypothesis", "Disturbed", "Image", "Calibration", "Installation", "Pose", "Reference"];
-    let mut known: Vec<&str> = met.iter().chain(&more).copied().collect();
+    let several = ["Rig", "Component", "Mode", "Seen", "RigCalibration"];
+    let mut known: Vec<&str> = met.iter().chain(&more).chain(&several).copied().collect();
     known.sort_unstable();
     assert_eq!(tables.keys().map(String::as_str).collect::<Vec<_>>(), known);
 
@@ -165,6 +169,51 @@ fn a_reader_written_from_the_page_reads_what_the_library_reads() {
     for broken in [text.replacen("format: 3", "format: 4", 1), text.replacen("seed: 7", "seed: 8", 1)] {
         assert!(read(&broken, "Model", &tables).is_err() && Model::read(&broken).is_err());
     }
+}
+
+/// The model as that of the only camera of a rig.
+fn reads_a_rig(model: &Model, calibration: &Calibration, tables: &Tables) {
+    let mut camera = model.clone();
+    camera.station.name = "bench.top".into();
+    let node = &model.nodes[0];
+    let seen = Seen { camera: 0, weight: 2.5, offset: -0.25, power: 9.0 };
+    let mode = Mode { fault: node.hypotheses[1].fault.clone(), threshold: -0.5, seen: vec![seen] };
+    let scores = (vec![0.5, 1.0], vec![-1.0]);
+    let of = Component { name: node.name.clone(), modes: vec![mode], good_scores: scores.0, fault_scores: scores.1 };
+    let rig = Rig {
+        format: model.format,
+        rig: "bench".into(),
+        writer: model.writer.clone(),
+        assembly: model.assembly.clone(),
+        spec: model.spec.clone(),
+        seed: model.seed,
+        promise: model.promise.clone(),
+        components: vec![of],
+        cameras: vec![camera],
+    };
+    let text = rig.write();
+    assert_eq!(Rig::read(&text).unwrap(), rig);
+    let value = read(&text, "Rig", tables).unwrap();
+    assert_eq!(value.at("rig").text(), "bench");
+    same_model(&value.at("cameras").items()[0], &rig.cameras[0]);
+    let component = &value.at("components").items()[0];
+    assert_eq!(
+        (component.at("name").text(), component.at("good_scores").floats()),
+        (node.name.as_str(), vec![0.5, 1.0])
+    );
+    let mode = &component.at("modes").items()[0];
+    assert_eq!(mode.at("threshold").float(), -0.5);
+    let seen = &mode.at("seen").items()[0];
+    let numbers = ["weight", "offset", "power"].map(|name| seen.at(name).float());
+    assert_eq!(numbers, [2.5, -0.25, 9.0]);
+
+    let own = Calibration { model: rig.cameras[0].digest(), ..calibration.clone() };
+    let calibration = RigCalibration::of(&rig, vec![own]);
+    let text = calibration.write();
+    assert_eq!(RigCalibration::read(&text, &rig).unwrap(), calibration);
+    let value = read(&text, "RigCalibration", tables).unwrap();
+    assert_eq!(value.at("rig").text(), rig.digest());
+    assert_eq!(value.at("cameras").items()[0].at("noise").float(), calibration.cameras[0].noise);
 }
 
 fn same_model(value: &Value, model: &Model) {

@@ -26,7 +26,7 @@ fn dim<'a>(design: &'a Design, name: &str) -> &'a gonogo::design::model::Dimensi
 
 #[test]
 fn every_spec_is_in_canonical_layout() {
-    for name in ["pattern_wheel", "four_screws", "pinned_plate", "shapes", "bearing_block"] {
+    for name in ["pattern_wheel", "four_screws", "pinned_plate", "shapes", "bearing_block", "two_views"] {
         let text = read(&format!("specs/{name}.gng")).unwrap();
         assert_eq!(gonogo::syntax::format(&text).unwrap(), text, "{name}");
     }

@@ -124,7 +124,7 @@ pub struct Jobs {
 pub struct Compile {
     /// The spec, or `-` for standard input.
     pub spec: PathBuf,
-    /// The station the model is for; the first of the spec unless given.
+    /// The station the model is for, with all of its cameras; the first of the spec unless given.
     #[arg(long, value_name = "NAME")]
     pub station: Option<String>,
     /// Where the model goes: `NAME.model.ron` in the current folder unless given.
@@ -183,7 +183,7 @@ pub struct Fmt {
 #[derive(Debug, Args)]
 pub struct Calibrate {
     pub model: PathBuf,
-    /// Photos of correct assemblies; one is enough.
+    /// Photos of correct assemblies; one is enough. Of several cameras one each: `top=PHOTO side=PHOTO`.
     #[arg(required = true)]
     pub photos: Vec<PathBuf>,
     /// Where the calibration goes.
@@ -194,7 +194,8 @@ pub struct Calibrate {
 #[derive(Debug, Args)]
 pub struct Inspect {
     pub model: PathBuf,
-    /// Photos, folders of photos, or `-` for standard input: an image, or the names of photos, one a line.
+    /// Photos, folders of photos, or `-` for standard input: an image, or the names of photos, one a line. Of several cameras
+    /// one each: `top=PHOTO side=PHOTO`.
     #[arg(value_name = "PHOTO", required_unless_present = "watch")]
     pub photos: Vec<PathBuf>,
     /// After these, judge every photo that appears in DIR, once it is completely written.

@@ -6,11 +6,12 @@ use super::messages::{self, Messages};
 use super::output::{self, DASH, Failure};
 use super::progress::Monitor;
 use super::watch::Round;
-use super::{Exit, fix, keep};
+use super::{Exit, fix, keep, rig};
 use crate::artifacts::Artifact;
 use crate::cache::folder::Counts;
 use crate::diag::Diagnostic;
-use crate::runtime::model::{Model, Rate};
+use crate::runtime::model::{Model, Promise, Rate};
+use crate::runtime::rig::Rig;
 use crate::{Compiled, Options};
 use std::collections::BTreeSet;
 use std::fs;
@@ -42,8 +43,9 @@ fn compile_once(args: &Compile, outputs: &Outputs, global: &Global) -> Round {
         }
         let written = outputs.write(&compiled)?;
         args.deps.write(&written, &round.inputs)?;
-        if let (Some(model), true) = (&compiled.model, outputs.model != Path::new(DASH)) {
-            summarise(model, &outputs.model)?;
+        if outputs.model != Path::new(DASH) {
+            compiled.model.iter().try_for_each(|model| summarise(model, &outputs.model))?;
+            compiled.rig.iter().try_for_each(|rig| rig::summarise(rig, &outputs.model))?;
         }
         Ok(Exit::Fine)
     });
@@ -238,8 +240,9 @@ impl Outputs {
             output::write(&path, bytes)?;
             written.push(path);
         }
-        if let Some(model) = compiled.model.as_ref().filter(|_| self.wants_model) {
-            output::write(&self.model, model.write().as_bytes())?;
+        let text = compiled.model.as_ref().map(Model::write).or_else(|| compiled.rig.as_ref().map(Rig::write));
+        if let Some(text) = text.filter(|_| self.wants_model) {
+            output::write(&self.model, text.as_bytes())?;
             written.push(self.model.clone());
         }
         Ok(written)
@@ -266,9 +269,13 @@ fn default_name(spec: &Path, station: Option<&str>) -> PathBuf {
 
 /// What the model promises, in a few lines.
 fn summarise(model: &Model, path: &Path) -> Result<(), Failure> {
-    let promise = &model.promise;
     let nodes = model.nodes.len();
     output::line(&format!("{}: station {}, {nodes} nodes", path.display(), model.station.name))?;
+    promised(&model.promise)
+}
+
+/// Both rates, and the error modes of which some escape.
+pub fn promised(promise: &Promise) -> Result<(), Failure> {
     output::line(&format!("  predicted false rejects: {}", rate(&promise.false_reject)))?;
     output::line(&format!("  predicted escapes:       {}", rate(&promise.escape)))?;
     let mut escapes = promise.modes.iter().filter(|m| m.escape.events > 0);

@@ -5,10 +5,11 @@ use super::args::{Calibrate, Inspect, VerdictFormat};
 use super::output::{self, DASH, Failure};
 use super::overlay;
 use super::photos::{self, End, Watch};
+use super::rig;
 use super::verdict::{self, Outcome};
 use crate::runtime::calibrate::{self, Calibration};
-use crate::runtime::inspect::{Decision, Inspector};
-use crate::runtime::model::Model;
+use crate::runtime::inspect::{Decision, Finding, Inspector};
+use crate::runtime::model::{Model, is_rig};
 use crate::runtime::photo::{Photo, PhotoError};
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
@@ -19,17 +20,16 @@ use std::time::Instant;
 
 /// Fits a model to its station.
 pub fn calibrate(args: &Calibrate) -> Result<Exit, Failure> {
-    let model = read_model(&args.model)?;
+    let text = output::read_text(&args.model)?;
+    if is_rig(&text) {
+        return rig::calibrate(args, &text);
+    }
+    let model = model_of(&args.model, &text)?;
     output::probe(&args.output)?;
     let photos = args.photos.iter().map(|p| photo(p, &model)).collect::<Result<Vec<Photo>, Failure>>()?;
     match calibrate::calibrate(&model, &photos) {
         Ok(calibration) => {
-            for doubt in calibrate::doubts(&model, &calibration, &photos).unwrap_or_default() {
-                output::remark(&format!(
-                    "warning: by the renders alone {} looks {}; the photo counts as correct: make sure that it is",
-                    doubt.component, doubt.fault
-                ));
-            }
+            calibrate::doubts(&model, &calibration, &photos).unwrap_or_default().iter().for_each(warn_of);
             output::write(&args.output, calibration.write().as_bytes())?;
             Ok(Exit::Fine)
         }
@@ -40,9 +40,21 @@ pub fn calibrate(args: &Calibrate) -> Result<Exit, Failure> {
     }
 }
 
+/// A photo for calibration that may show a fault.
+pub fn warn_of(doubt: &Finding) {
+    output::remark(&format!(
+        "warning: by the renders alone {} looks {}; the photo counts as correct: make sure that it is",
+        doubt.component, doubt.fault
+    ));
+}
+
 /// Judges photos one after the other. A photo that cannot be read is a verdict of its own and stops nothing.
 pub fn inspect(args: &Inspect) -> Result<Exit, Failure> {
-    let model = read_model(&args.model)?;
+    let text = output::read_text(&args.model)?;
+    if is_rig(&text) {
+        return rig::inspect(args, &text);
+    }
+    let model = model_of(&args.model, &text)?;
     let calibration = calibration(args.calibration.as_deref(), &model)?;
     let listed = photos::listed(&args.photos)?;
     let overlays = args.overlay.as_deref().map(|dir| Overlays::new(dir, &listed)).transpose()?;
@@ -118,7 +130,7 @@ impl Desk<'_> {
 }
 
 /// 0 all go, 1 any no-go, 2 any that could not be judged, whatever the others are.
-fn exit_of(decision: Decision) -> Exit {
+pub fn exit_of(decision: Decision) -> Exit {
     match decision {
         Decision::Go => Exit::Fine,
         Decision::NoGo => Exit::Faults,
@@ -170,15 +182,15 @@ fn overlay_name(photo: &Path) -> OsString {
 }
 
 /// A folder of overlays. Two photos must not end in one overlay, and no overlay on its own photo.
-struct Overlays {
-    dir: PathBuf,
+pub struct Overlays {
+    pub dir: PathBuf,
     /// By name of the overlay, the photo under it.
     photos: BTreeMap<OsString, PathBuf>,
 }
 
 impl Overlays {
     /// What is known to go wrong goes wrong before the first photo is judged.
-    fn new(dir: &Path, photos: &[PathBuf]) -> Result<Overlays, Failure> {
+    pub fn new(dir: &Path, photos: &[PathBuf]) -> Result<Overlays, Failure> {
         output::make_dir(dir)?;
         let mut overlays = Overlays { dir: dir.to_path_buf(), photos: BTreeMap::new() };
         photos.iter().filter(|p| *p != Path::new(DASH)).try_for_each(|photo| overlays.admit(photo))?;
@@ -186,7 +198,7 @@ impl Overlays {
         Ok(overlays)
     }
 
-    fn admit(&mut self, photo: &Path) -> Result<(), Failure> {
+    pub fn admit(&mut self, photo: &Path) -> Result<(), Failure> {
         let name = overlay_name(photo);
         let itself = fs::canonicalize(photo).ok().zip(fs::canonicalize(self.dir.join(&name)).ok());
         if itself.is_some_and(|(photo, overlay)| photo == overlay) {
@@ -207,8 +219,11 @@ impl Overlays {
 }
 
 pub fn read_model(path: &Path) -> Result<Model, Failure> {
-    let text = output::read_text(path)?;
-    Model::read(&text).map_err(|e| Failure(format!("`{}`: {e}", path.display())))
+    model_of(path, &output::read_text(path)?)
+}
+
+fn model_of(path: &Path, text: &str) -> Result<Model, Failure> {
+    Model::read(text).map_err(|e| Failure(format!("`{}`: {e}", path.display())))
 }
 
 /// The model with its calibration, ready to judge.
@@ -220,15 +235,22 @@ pub fn inspector<'a>(model: &'a Model, calibration: &'a Calibration) -> Result<I
 /// The calibration in a file; without one the station as the spec describes it, and a warning.
 pub fn calibration(path: Option<&Path>, model: &Model) -> Result<Calibration, Failure> {
     let Some(path) = path else {
-        output::remark("warning: not calibrated: camera and lamps are taken to be as the spec says");
-        output::remark("  help: gonogo calibrate MODEL PHOTO -o CALIBRATION, with one photo of a correct assembly");
+        warn_uncalibrated("PHOTO");
         return Ok(Calibration::nominal(model));
     };
     let text = output::read_text(path)?;
     Calibration::read(&text, model).map_err(|e| Failure(format!("`{}`: {e}", path.display())))
 }
 
-fn photo(path: &Path, model: &Model) -> Result<Photo, Failure> {
+/// `photos` is what `calibrate` takes.
+pub fn warn_uncalibrated(photos: &str) {
+    output::remark("warning: not calibrated: camera and lamps are taken to be as the spec says");
+    output::remark(&format!(
+        "  help: gonogo calibrate MODEL {photos} -o CALIBRATION, with one photo of a correct assembly"
+    ));
+}
+
+pub fn photo(path: &Path, model: &Model) -> Result<Photo, Failure> {
     let bytes = output::read(path)?;
     let station = &model.station;
     Photo::decode(&bytes, station.tone, station.camera.size).map_err(|e| Failure(format!("`{}`: {e}", path.display())))

@@ -28,6 +28,7 @@ pub mod report {
     pub use super::messages::{github, human, json, sarif, short};
 }
 mod report_page;
+mod rig;
 mod shells;
 mod verdict;
 mod watch;

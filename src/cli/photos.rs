@@ -4,6 +4,7 @@
 
 use super::output::{self, DASH, Failure};
 use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::io::{self, BufRead, Read};
 use std::path::{Path, PathBuf};
@@ -95,6 +96,18 @@ struct Stamp {
     size: u64,
 }
 
+/// A photo that has stopped growing, and whether it may be given more time.
+type Settled = (PathBuf, Stamp, bool);
+
+/// The names without their endings, in the order in which they were first complete.
+fn names(looks: &[Vec<Settled>]) -> Vec<OsString> {
+    let mut all: Vec<OsString> = Vec::new();
+    for (path, ..) in looks.iter().flatten() {
+        all.extend(path.file_stem().map(OsStr::to_os_string).filter(|name| !all.contains(name)));
+    }
+    all
+}
+
 /// When watching ends, if ever.
 pub struct End<'a> {
     pub after: Option<u64>,
@@ -138,8 +151,55 @@ impl Watch {
         Ok(())
     }
 
+    /// The same for several cameras, a folder each: hands over the photos of one name when all are there and complete. When
+    /// watching is to end, what has waited in vain for the others comes without them.
+    pub fn run_together(
+        watches: &mut [Watch],
+        end: &End,
+        mut each: impl FnMut(&[Option<(PathBuf, Vec<u8>)>], bool) -> Result<bool, Failure>,
+    ) -> Result<(), Failure> {
+        let mut count = 0;
+        while end.after.is_none_or(|after| count < after) {
+            let ending = end.once_there.is_some_and(Path::exists);
+            let looks = watches.iter_mut().map(Watch::look).collect::<Result<Vec<_>, Failure>>()?;
+            for name in names(&looks) {
+                if end.after.is_some_and(|after| count >= after) {
+                    break;
+                }
+                let of = |look: &Vec<Settled>| look.iter().find(|(path, ..)| path.file_stem() == Some(&name)).cloned();
+                let found: Vec<Option<Settled>> = looks.iter().map(of).collect();
+                let patient = found.iter().flatten().all(|(_, _, patient)| *patient);
+                if !(found.iter().all(Option::is_some) || ending && !patient) {
+                    continue;
+                }
+                let read = |found: &Option<Settled>| match found {
+                    Some((path, stamp, _)) => {
+                        let bytes = output::read(path).ok().filter(|_| stamp_of(path) == Some(*stamp))?;
+                        Some(Some((path.clone(), bytes)))
+                    }
+                    None => Some(None),
+                };
+                let Some(photos) = found.iter().map(read).collect::<Option<Vec<_>>>() else { continue };
+                if each(&photos, patient)? {
+                    for (watch, (path, stamp, _)) in
+                        watches.iter_mut().zip(&found).filter_map(|(w, f)| Some((w, f.as_ref()?)))
+                    {
+                        watch.waiting.remove(path);
+                        watch.seen.insert(path.clone(), *stamp);
+                    }
+                    count += 1;
+                }
+            }
+            if ending && watches.iter().all(|watch| watch.waiting.is_empty()) {
+                break;
+            }
+            sleep(PAUSE);
+        }
+        Ok(())
+    }
+
     /// The photos that have stopped growing, oldest first, and whether they may be given more time.
-    fn look(&mut self) -> Result<Vec<(PathBuf, Stamp, bool)>, Failure> {
+    fn look(&mut self) -> Result<Vec<Settled>, Failure> {
         let now = in_folder(&self.folder)?;
         self.seen.retain(|path, _| now.contains_key(path));
         self.waiting.retain(|path, _| now.contains_key(path));

@@ -7,7 +7,7 @@ use super::{Exit, judge, keep};
 use crate::report::{self, Assembly, Shot, Trained, View};
 use crate::runtime::calibrate::Calibration;
 use crate::runtime::inspect::{Inspector, Verdict};
-use crate::runtime::model::Model;
+use crate::runtime::model::{Model, is_rig};
 use crate::runtime::photo::Photo;
 use crate::{Compiled, Options};
 use image::GrayImage;
@@ -17,7 +17,7 @@ use std::path::Path;
 pub fn report(args: &Report, global: &Global) -> Result<Exit, Failure> {
     output::probe(&args.output)?;
     let spec = Document::read(&args.spec)?;
-    let model = args.model.as_deref().map(judge::read_model).transpose()?;
+    let model = args.model.as_deref().map(one_camera).transpose()?;
     let calibration = match (&model, &args.calibration) {
         (Some(model), Some(path)) => Some(judge::calibration(Some(path), model)?),
         _ => None,
@@ -42,6 +42,19 @@ pub fn report(args: &Report, global: &Global) -> Result<Exit, Failure> {
     let page = page(&spec.name, &compiled, model.as_ref(), calibration.as_ref(), &judged);
     output::write(&args.output, page.as_bytes())?;
     Ok(if fine { Exit::Fine } else { Exit::Faults })
+}
+
+/// The model; that of several cameras is not shown yet.
+fn one_camera(path: &Path) -> Result<Model, Failure> {
+    let text = output::read_text(path)?;
+    if is_rig(&text) {
+        return Err(Failure(format!(
+            "`{}` holds the models of several cameras: the page shows what they see without `--model`, or the model of one \
+             camera (`gonogo compile --station STATION.CAMERA`)",
+            path.display()
+        )));
+    }
+    Model::read(&text).map_err(|e| Failure(format!("`{}`: {e}", path.display())))
 }
 
 /// A photo as people see it and as it was judged.
@@ -97,6 +110,10 @@ pub fn page(
         bodies: &made.bodies,
         choice,
     });
+    let others: Vec<View> = made.design.as_ref().map_or_else(Vec::new, |design| {
+        let view = |(station, choice)| View { station: &design.stations[station], bodies: &made.bodies, choice };
+        made.others.iter().map(|(station, choice)| view((*station, choice))).collect()
+    });
     let photos: Vec<Shot> = judged
         .iter()
         .map(|j| Shot { name: &j.name, grey: j.grey.as_ref(), photo: j.photo.as_ref(), verdict: &j.verdict })
@@ -107,6 +124,7 @@ pub fn page(
         sources: &compiled.sources,
         assembly,
         view,
+        others: &others,
         model: model.map(|model| Trained { model, calibration, fits: model.spec == made.digest }),
         photos: &photos,
     })

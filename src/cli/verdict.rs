@@ -9,13 +9,18 @@ use std::collections::BTreeSet;
 
 /// One line for people.
 pub fn human(outcome: &Outcome) -> String {
+    human_of(outcome, &[])
+}
+
+/// The same with the camera that saw each finding.
+pub fn human_of(outcome: &Outcome, seen_by: &[String]) -> String {
     let verdict = &outcome.verdict;
     let mut text = format!("{:<15} {}", word(verdict.decision), outcome.photo);
     if let Some(pose) = verdict.pose {
         text += &format!("  at ({:+.2}, {:+.2}) mm, {:+.2}°", pose.x, pose.y, pose.rz.to_degrees());
     }
-    for finding in &verdict.findings {
-        text += &format!("\n    {}", found(finding));
+    for (i, finding) in verdict.findings.iter().enumerate() {
+        text += &format!("\n    {}", found(finding, seen_by.get(i)));
     }
     if verdict.decision == Decision::CannotInspect {
         text += &format!("\n    {}", verdict.reason);
@@ -24,9 +29,10 @@ pub fn human(outcome: &Outcome) -> String {
 }
 
 /// `pin[2]: missing (p = 0.0004, px 1 2 3 4)`
-fn found(finding: &Finding) -> String {
+fn found(finding: &Finding, camera: Option<&String>) -> String {
     let at = finding.box_px.map(|v| format!("{v:.0}")).join(" ");
-    format!("{}: {} (p = {:.4}, px {at})", finding.component, finding.fault, finding.p_value)
+    let camera = camera.map(|camera| format!("{camera} ")).unwrap_or_default();
+    format!("{}: {} (p = {:.4}, {camera}px {at})", finding.component, finding.fault, finding.p_value)
 }
 
 /// The components a model answers for: those it knows a fault of beside the good state.
@@ -103,7 +109,8 @@ fn cases(outcome: &Outcome, watched: &[String]) -> Vec<(String, Case)> {
     names.retain(|name| seen.insert(*name));
     let explained = |name: &str| verdict.nodes.iter().any(|n| n.name == name && n.faulty && n.explained);
     let case = |name: &str| {
-        let findings: Vec<String> = verdict.findings.iter().filter(|f| f.component == name).map(found).collect();
+        let findings: Vec<String> =
+            verdict.findings.iter().filter(|f| f.component == name).map(|f| found(f, None)).collect();
         match verdict.decision {
             Decision::CannotInspect => Case::Error(verdict.reason.clone()),
             Decision::NoGo if !findings.is_empty() => Case::Failed(findings.join("; ")),

@@ -489,7 +489,7 @@ impl Resolver {
                     .help("write `station bench { light room = room(patches = 9) }`"),
             );
         }
-        blocks.stations.iter().map(|(name, body)| self.station(name, body, &catalogue.materials)).collect()
+        blocks.stations.iter().flat_map(|(name, body)| self.station(name, body, &catalogue.materials)).collect()
     }
 
     fn check_inspect_name(&mut self, blocks: &Blocks) {

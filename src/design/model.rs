@@ -318,8 +318,10 @@ pub struct Floor {
     pub material: usize,
 }
 
+/// A camera with what it stands in. The cameras of a rig are stations of their own that share all but the camera.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Station {
+    /// Of a camera of a rig `line.top`: names that are written have no dot.
     pub name: String,
     pub camera: CameraSpec,
     pub lights: Vec<LightSpec>,
@@ -335,6 +337,18 @@ pub struct Station {
     pub noise: f64,
     #[serde(skip)]
     pub span: Span,
+}
+
+impl Station {
+    /// The names of the rig and of this camera in it; `None` for the camera of a station that has but one.
+    pub fn in_rig(&self) -> Option<(&str, &str)> {
+        self.name.split_once('.')
+    }
+
+    /// The name of the station as the spec has it.
+    pub fn place_name(&self) -> &str {
+        self.in_rig().map_or(&self.name, |(rig, _)| rig)
+    }
 }
 
 /// What the inspector answers for.

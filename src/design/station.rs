@@ -1,6 +1,7 @@
 //! `station`: camera, lights, floor, and what varies from photo to photo.
 //!
-//! Every field has a default; docs/src/language.md lists them.
+//! Every field has a default; docs/src/language.md lists them. A station with several named cameras (a rig) comes out as one
+//! [`Station`] a camera, `line.top` and `line.side`, which share all but the camera.
 
 use super::fields::Fields;
 use super::model::{CameraPlacing, CameraSpec, Floor, LightShape, LightSpec, PerPhoto, Response, Station};
@@ -17,6 +18,9 @@ const POSITIVE: [f64; 2] = [f64::MIN_POSITIVE, f64::MAX];
 const ANY: [f64; 2] = [f64::MIN, f64::MAX];
 /// Exposures beside the nominal one: beyond these a photo is black or white.
 const EXPOSURES: [f64; 2] = [0.05, 20.0];
+
+/// More cameras than this look at no one assembly.
+const MOST_CAMERAS: usize = 8;
 
 /// Steps (half image widths) in which a lens is searched for the radius from which on it folds the image over.
 const FOLD_STEP: f64 = 0.05;
@@ -52,15 +56,81 @@ const CAMERA_FIELDS: [&str; 16] = [
 ];
 
 impl Resolver {
-    pub fn station(&mut self, name: &Name, body: &Body, materials: &BTreeMap<&str, usize>) -> Station {
-        let nothing = Body::default();
-        let mut camera = None;
+    /// One station a camera; one alone bears the station's name.
+    pub fn station(&mut self, name: &Name, body: &Body, materials: &BTreeMap<&str, usize>) -> Vec<Station> {
+        let cameras = self.cameras(name, body);
+        let is_rig = cameras.len() > 1;
+        let first = self.with_camera(cameras[0].1.clone(), name, body, materials);
+        let of = |(own, camera): (Option<&Name>, CameraSpec)| {
+            let full = own.filter(|_| is_rig).map(|own| format!("{}.{}", name.text, own.text));
+            Station { name: full.unwrap_or_else(|| name.text.clone()), camera, ..first.clone() }
+        };
+        cameras.into_iter().map(of).collect()
+    }
+
+    /// The cameras of a station; several have a name each.
+    fn cameras<'a>(&mut self, station: &Name, body: &'a Body) -> Vec<(Option<&'a Name>, CameraSpec)> {
+        let mut cameras: Vec<(Option<&Name>, CameraSpec)> = Vec::new();
+        let mut nameless = Vec::new();
+        for line in &body.lines {
+            let Stmt::Camera { name, mode, body } = &line.stmt else { continue };
+            let first = |name: &Name| {
+                cameras.iter().filter_map(|(n, _)| *n).find(|first| first.text == name.text).map(|first| first.span)
+            };
+            match name.as_ref().map(|name| (name, first(name))) {
+                Some((name, Some(first))) => self.duplicate("camera", name, first),
+                Some(_) => {}
+                None => nameless.push((cameras.len(), line.span)),
+            }
+            let camera = self.camera(mode.as_ref(), body, line.span);
+            cameras.push((name.as_ref(), camera));
+        }
+        if cameras.len() > 1 {
+            nameless.into_iter().for_each(|(index, span)| self.nameless(station, &cameras, (index, span)));
+        }
+        if cameras.len() > MOST_CAMERAS {
+            let message =
+                format!("station `{}` has {} cameras, at most {MOST_CAMERAS} are allowed", station.text, cameras.len());
+            self.report(Diagnostic::error("E0212", station.span, message).label("too many cameras"));
+        }
+        if cameras.is_empty() {
+            cameras.push((None, self.camera(None, &Body::default(), station.span)));
+        }
+        cameras
+    }
+
+    /// A camera without a name beside others.
+    fn nameless(&mut self, station: &Name, all: &[(Option<&Name>, CameraSpec)], (index, span): (usize, Span)) {
+        const KEYWORD: u32 = 6;
+        let taken = |name: &String| all.iter().any(|(n, _)| n.is_some_and(|n| n.text == *name));
+        let free = (index + 1..).map(|i| format!("camera_{i}")).find(|name| !taken(name)).unwrap_or_default();
+        let behind = span.start + KEYWORD;
+        let message = format!("station `{}` has {} cameras: each needs a name", station.text, all.len());
+        self.report(
+            Diagnostic::error("E0207", Span { end: behind, ..span }, message)
+                .label("a camera without a name")
+                .note("photos are given by the names of the cameras: `gonogo inspect MODEL top=PHOTO side=PHOTO`")
+                .suggest(
+                    format!("write `camera {free}`"),
+                    Span { start: behind, end: behind, ..span },
+                    format!(" {free}"),
+                ),
+        );
+    }
+
+    /// The cameras of a station share all the rest.
+    fn with_camera(
+        &mut self,
+        camera: CameraSpec,
+        name: &Name,
+        body: &Body,
+        materials: &BTreeMap<&str, usize>,
+    ) -> Station {
         let mut lights: Vec<LightSpec> = Vec::new();
         let mut floor = None;
         let mut vary = Fields::none("vary", name.span);
         for line in &body.lines {
             match &line.stmt {
-                Stmt::Camera { mode, body } => camera = Some(self.camera(mode.as_ref(), body, line.span)),
                 Stmt::Light { name, call } => {
                     if let Some(first) = lights.iter().find(|l| l.name == name.text) {
                         let first = first.span;
@@ -80,7 +150,7 @@ impl Resolver {
         let still = Range::exactly(0.0);
         Station {
             name: name.text.clone(),
-            camera: camera.unwrap_or_else(|| self.camera(None, &nothing, name.span)),
+            camera,
             lights,
             floor,
             x: self.range_or(&vary, "x", Quantity::Length, still),

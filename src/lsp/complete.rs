@@ -95,7 +95,7 @@ impl Proposals<'_> {
             }
             ("file", ["tolerances", ..]) => self.plain(GENERAL, CompletionItemKind::ENUM_MEMBER),
             ("file", ["inspect"]) => self.names(Kind::Assembly, None),
-            (_, ["camera"]) => self.keywords("camera", &["fixed", "auto"]),
+            (_, ["camera"] | ["camera", _]) => self.keywords("camera", &["fixed", "auto"]),
             ("file", ["part", _, "="]) => self.names(Kind::Family, None),
             (_, ["let", _, "=", value @ ..]) => self.dimension(value, Takes::Length, ""),
             (_, ["light", _, "="]) => self.calls(Role::Light),

@@ -258,7 +258,8 @@ pub const OWNERS: &[Owner] = &[
     Owner {
         name: "camera",
         role: Role::Block,
-        doc: "the camera: `fixed`, or `auto` within ranges among which the compiler chooses",
+        doc: "the camera: `fixed`, or `auto` within ranges among which the compiler chooses; several have a name each: \
+              `camera top fixed`",
         arguments: &[
             arg("image", Image, "size of the image; 640 x 480 px"),
             arg("focal", Length, "focal length; 16 mm ±0.5 %"),

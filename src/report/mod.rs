@@ -50,6 +50,8 @@ pub struct Report<'a> {
     pub sources: &'a Sources,
     pub assembly: Option<Assembly<'a>>,
     pub view: Option<View<'a>>,
+    /// From the other cameras, where the station has several.
+    pub others: &'a [View<'a>],
     pub model: Option<Trained<'a>>,
     pub photos: &'a [Shot<'a>],
 }
@@ -155,8 +157,11 @@ fn sections(report: &Report) -> Vec<Section> {
     add("measures", "Measured distances", analysed.and_then(|a| measures::section(&a)));
     add(
         "view",
-        "What the camera sees",
-        report.assembly.zip(report.view).map(|(a, v)| station::section(&a, &v, report)),
+        if report.others.is_empty() { "What the camera sees" } else { "What the cameras see" },
+        report.assembly.zip(report.view).map(|(a, v)| {
+            let views = std::iter::once(&v).chain(report.others);
+            views.map(|view| station::section(&a, view, report)).collect::<Vec<_>>().join("\n")
+        }),
     );
     add("promise", "What can be told", report.model.map(|m| promise::section(&m, report)));
     add("photos", "Photos", photos::section(report));

@@ -23,7 +23,7 @@ const PRIOR_PULL: f64 = 1e-3;
 /// Sensor noise that every 8-bit photo has: the rounding (share of full scale).
 const ROUNDING: f64 = 1.0 / (255.0 * 3.464);
 /// The fault that comes in any size.
-const SLIGHT: &str = "not seated";
+pub(super) const SLIGHT: &str = "not seated";
 /// Format of the calibration file.
 pub const FORMAT: u32 = 3;
 
@@ -154,9 +154,15 @@ impl Calibration {
     /// Reads a calibration and checks that it belongs to `model`.
     pub fn read(text: &str, model: &Model) -> Result<Calibration, ModelError> {
         let body = model::open(text, FORMAT)?;
-        let malformed = |why: &str| ModelError::Malformed(why.into());
         let calibration: Calibration =
             ron::from_str(body).map_err(|e| ModelError::Malformed(format!("not a calibration: {e}")))?;
+        calibration.check(model)?;
+        Ok(calibration)
+    }
+
+    pub(super) fn check(&self, model: &Model) -> Result<(), ModelError> {
+        let malformed = |why: &str| ModelError::Malformed(why.into());
+        let calibration = self;
         if calibration.model != model.digest() {
             return Err(malformed("the calibration belongs to another model: calibrate again"));
         }
@@ -167,7 +173,7 @@ impl Calibration {
         if !finite || !likely || !lamps || !references || calibration.noise.is_nan() || calibration.noise <= 0.0 {
             return Err(malformed("the calibration's numbers are out of range"));
         }
-        Ok(calibration)
+        Ok(())
     }
 }
 

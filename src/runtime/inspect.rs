@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 /// A node of which less is inside the photo cannot be judged.
-const LEAST_INSIDE: f64 = 0.6;
+pub(super) const LEAST_INSIDE: f64 = 0.6;
 /// Strangeness of a square in which every coefficient is three standard deviations off (Student's t, five degrees).
 const STRANGE: f64 = 3.09;
 /// Weight of the middle strangeness of the photo's nodes in what one may have.
@@ -228,7 +228,7 @@ impl<'a> Inspector<'a> {
     }
 
     /// Log-likelihoods of the disturbed states of the nodes that need an explanation; empty for the others.
-    fn disturbed(&self, nodes: &[NodeReport], photo: &Photo, pose: &Pose) -> Vec<Vec<f64>> {
+    pub(super) fn disturbed(&self, nodes: &[NodeReport], photo: &Photo, pose: &Pose) -> Vec<Vec<f64>> {
         let needed = |i: usize| nodes[i].faulty && !self.model.nodes[i].disturbed.is_empty();
         if nodes.iter().filter(|n| n.faulty).count() < 2 {
             return vec![Vec::new(); nodes.len()];
@@ -290,7 +290,14 @@ impl<'a> Inspector<'a> {
 
     /// Whether a fault of one node explains what another shows: it covers most of it, or the other looks rather like its
     /// own good state beside that fault than like any fault of its own.
-    fn explains(&self, blamed: usize, fault: &str, node: usize, evidence: &Evidence, disturbed: &[f64]) -> bool {
+    pub(super) fn explains(
+        &self,
+        blamed: usize,
+        fault: &str,
+        node: usize,
+        evidence: &Evidence,
+        disturbed: &[f64],
+    ) -> bool {
         if self.model.nodes[blamed].disturbs.contains(&(node as u32)) {
             return true;
         }
@@ -349,7 +356,7 @@ impl<'a> Inspector<'a> {
 
 /// The node that is least like its good state, if some part of it is farther from it than noise and what the photo's other
 /// nodes have in common (a model that is not quite this station's) can bring it. A lone node has nothing to be held against.
-fn strange(nodes: &[NodeReport]) -> Option<&NodeReport> {
+pub(super) fn strange(nodes: &[NodeReport]) -> Option<&NodeReport> {
     let mut rising: Vec<&NodeReport> = nodes.iter().collect();
     rising.sort_by(|a, b| a.strangeness.total_cmp(&b.strangeness));
     let (worst, others) = rising.split_last()?;
@@ -392,7 +399,7 @@ fn p_value(node: &Node, score: f64) -> f64 {
     (1 + lower) as f64 / (1 + node.good_scores.len()) as f64
 }
 
-fn summary(findings: &[Finding]) -> String {
+pub(super) fn summary(findings: &[Finding]) -> String {
     let each: Vec<String> = findings.iter().map(|f| format!("{}: {}", f.component, f.fault)).collect();
     each.join(", ")
 }

@@ -262,6 +262,10 @@ impl Model {
     /// Reads a model and checks it: format, digest, sizes.
     pub fn read(text: &str) -> Result<Model, ModelError> {
         let body = open(text, FORMAT)?;
+        if is_rig(body) {
+            let why = "it holds the models of several cameras that judge together, not that of one";
+            return Err(ModelError::Malformed(why.into()));
+        }
         let model: Model = ron::from_str(body).map_err(|e| ModelError::Malformed(e.to_string()))?;
         model.check().map_err(|why| ModelError::Malformed(why.into()))?;
         Ok(model)
@@ -272,7 +276,7 @@ impl Model {
         digest_of(&to_ron(self))
     }
 
-    fn check(&self) -> Result<(), &'static str> {
+    pub(super) fn check(&self) -> Result<(), &'static str> {
         ensure(self.nodes.len() <= MOST_NODES, "too many nodes")?;
         ensure((1..=MOST_LAMPS).contains(&self.station.lamps.len()), "no lamps, or too many")?;
         ensure(self.station.camera.size.iter().all(|s| (8..=LARGEST_IMAGE).contains(s)), "image size out of range")?;
@@ -364,7 +368,7 @@ fn check_images(images: &[Image], lamps: usize, width: usize, height: usize) -> 
     Ok(())
 }
 
-fn ensure(holds: bool, otherwise: &'static str) -> Result<(), &'static str> {
+pub(super) fn ensure(holds: bool, otherwise: &'static str) -> Result<(), &'static str> {
     if holds { Ok(()) } else { Err(otherwise) }
 }
 
@@ -372,7 +376,12 @@ fn ensure(holds: bool, otherwise: &'static str) -> Result<(), &'static str> {
 pub(super) fn to_ron<T: Serialize>(value: &T) -> String {
     /// Model, nodes, node, hypotheses, hypothesis, images, image, rows.
     const DEPTH: usize = 8;
-    let config = ron::ser::PrettyConfig::new().depth_limit(DEPTH).new_line("\n").indentor(" ");
+    to_ron_down_to(DEPTH, value)
+}
+
+/// Pretty RON down to a depth.
+pub(super) fn to_ron_down_to<T: Serialize>(depth: usize, value: &T) -> String {
+    let config = ron::ser::PrettyConfig::new().depth_limit(depth).new_line("\n").indentor(" ");
     let mut text = ron::ser::to_string_pretty(value, config).expect("plain data always serialises");
     text.push('\n');
     text
@@ -413,7 +422,13 @@ fn format_of(text: &str) -> Option<u32> {
     rest[..digits].parse().ok()
 }
 
-fn digest_of(text: &str) -> String {
+/// Whether a text is of several cameras ([`super::rig`]): `rig` stands behind its format.
+pub fn is_rig(text: &str) -> bool {
+    let behind = |text: &str| Some(text.trim_start().split_once(',')?.1.trim_start().starts_with("rig:"));
+    format_of(text).is_some() && behind(text).unwrap_or(false)
+}
+
+pub(super) fn digest_of(text: &str) -> String {
     blake3::hash(text.as_bytes()).to_hex().to_string()
 }
 

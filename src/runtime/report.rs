@@ -32,9 +32,21 @@ impl Outcome {
 
     /// One JSON object, without the line break.
     pub fn json(&self) -> String {
+        self.json_of(&[], &[])
+    }
+
+    /// The same for several cameras: their names and photos, and for each finding the camera that saw it.
+    pub(super) fn json_of(&self, photos: &[(&str, &str)], seen_by: &[String]) -> String {
         let verdict = &self.verdict;
         let mut text = String::from("{\"photo\":");
         string(&mut text, &self.photo);
+        for (i, (camera, photo)) in photos.iter().enumerate() {
+            text += if i > 0 { "," } else { ",\"photos\":{" };
+            string(&mut text, camera);
+            text += ":";
+            string(&mut text, photo);
+            text += if i + 1 == photos.len() { "}" } else { "" };
+        }
         text += ",\"verdict\":";
         string(&mut text, word(verdict.decision));
         text += ",\"reason\":";
@@ -60,7 +72,7 @@ impl Outcome {
         text += ",\"findings\":[";
         for (i, found) in verdict.findings.iter().enumerate() {
             text += if i > 0 { "," } else { "" };
-            finding(&mut text, found);
+            finding(&mut text, found, seen_by.get(i));
         }
         text += "],\"milliseconds\":";
         match self.milliseconds {
@@ -80,7 +92,7 @@ pub fn word(decision: Decision) -> &'static str {
     }
 }
 
-fn finding(text: &mut String, finding: &Finding) {
+fn finding(text: &mut String, finding: &Finding, camera: Option<&String>) {
     let names = [
         ("{\"component\":", &finding.component),
         (",\"fault\":", &finding.fault),
@@ -90,6 +102,10 @@ fn finding(text: &mut String, finding: &Finding) {
     for (key, name) in names {
         *text += key;
         string(text, name);
+    }
+    if let Some(camera) = camera {
+        *text += ",\"camera\":";
+        string(text, camera);
     }
     *text += ",\"p_value\":";
     number(text, finding.p_value, 6);

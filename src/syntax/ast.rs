@@ -114,6 +114,8 @@ pub enum Stmt {
         body: Body,
     },
     Camera {
+        /// Where a station has several.
+        name: Option<Name>,
         mode: Option<Name>,
         body: Body,
     },

@@ -167,7 +167,9 @@ fn head_and_tail(stmt: &Stmt, width: usize, layout: Layout) -> String {
             format!("{}{}", named("root", name), part.as_ref().map_or(String::new(), |p| format!(" = {}", p.text)))
         }
         Stmt::Place(p) => place(p),
-        Stmt::Camera { mode, .. } => optional("camera", mode),
+        Stmt::Camera { name, mode, .. } => {
+            [name, mode].into_iter().flatten().fold("camera".into(), |c, n| named(&c, n))
+        }
         Stmt::Floor(_) => "floor".to_string(),
         Stmt::Vary(_) => "vary".to_string(),
         Stmt::Inspect { name, .. } => optional("inspect", name),

@@ -10,6 +10,7 @@ use crate::runtime::light::Light;
 use crate::runtime::model::Lamp;
 
 /// How the photos of a station are exposed.
+#[derive(Debug, Clone)]
 pub struct Exposing {
     exposure: PerPhoto,
     /// By light, what its lamps drift by themselves (± this share).

@@ -11,6 +11,7 @@ mod kept;
 mod other_views;
 pub mod plan;
 pub mod prove;
+pub mod rig;
 pub mod shots;
 pub mod stats;
 pub mod synthesise;
@@ -89,7 +90,7 @@ pub fn train(job: &Job, observer: &Observer) -> Result<(Model, Vec<Diagnostic>),
     (model.assembly, model.spec) = (job.design.name.clone(), job.spec.clone());
     verify::settle(&mut model, job.design, &learnt.scenes, job.modes, &learnt.held_out);
     let mut found = blind(job, &learnt.unseen);
-    found.extend(overlaps(job, &model));
+    found.extend(overlaps(job, &model.promise));
     let mut doubts = advised(job, found, &mut learnt.advice)?;
     doubts.extend(white::highlights(job, &model));
     if is_new {
@@ -143,8 +144,8 @@ fn blind(job: &Job, unseen: &[usize]) -> Vec<Doubt> {
 }
 
 /// Faults that the model lets pass too often to rely on it.
-fn overlaps(job: &Job, model: &Model) -> Vec<Doubt> {
-    let weak = model.promise.modes.iter().filter(|m| f64::from(m.escape.events) > WEAK * f64::from(m.escape.trials));
+fn overlaps(job: &Job, promise: &Promise) -> Vec<Doubt> {
+    let weak = promise.modes.iter().filter(|m| f64::from(m.escape.events) > WEAK * f64::from(m.escape.trials));
     let doubt = |rate: &ModeRate| {
         let of =
             |m: &ErrorMode| job.design.components[m.component].name == rate.component && m.kind.word() == rate.fault;

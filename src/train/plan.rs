@@ -75,6 +75,36 @@ pub struct Plan {
 
 /// Plans nodes and scenes for the watched components.
 pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, liaison: &Liaison, modes: &[ErrorMode]) -> Plan {
+    let draft = draft(design, camera, nominal, modes);
+    let scenes = gather(modes, &[&draft.changes]);
+    finished(design, camera, nominal, liaison, modes, draft, &scenes)
+}
+
+/// Plans for several cameras that look at the same assemblies: the scenes are common to all, so that in each of them every
+/// camera takes its photo of the same faults. A scene of a plan may show modes that its camera does not see.
+pub fn together(
+    design: &Design,
+    cameras: &[Camera],
+    nominal: &Drawn,
+    liaison: &Liaison,
+    modes: &[ErrorMode],
+) -> Vec<Plan> {
+    let drafts: Vec<Draft> = cameras.iter().map(|camera| draft(design, camera, nominal, modes)).collect();
+    let scenes = gather(modes, &drafts.iter().map(|d| d.changes.as_slice()).collect::<Vec<_>>());
+    let finish = |(camera, draft): (&Camera, Draft)| finished(design, camera, nominal, liaison, modes, draft, &scenes);
+    cameras.iter().zip(drafts).map(finish).collect()
+}
+
+/// What one camera sees, before it is known which modes are shown together.
+struct Draft {
+    base: u32,
+    good: ItemBuffer,
+    /// Per mode, where the image changes; `None` where next to nothing does, or nobody watches.
+    changes: Vec<Option<Mask>>,
+    unseen: Vec<usize>,
+}
+
+fn draft(design: &Design, camera: &Camera, nominal: &Drawn, modes: &[ErrorMode]) -> Draft {
     let base = resolution(design, camera, nominal);
     let small = camera.reduced(base);
     let view = View { drawn: nominal, camera: &small, good: seen(nominal, &[], &small) };
@@ -85,6 +115,20 @@ pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, liaison: &Liaison
         changes.push(changed.filter(|mask| mask.count() >= LEAST_PIXELS));
     }
     let unseen = (0..modes.len()).filter(|&m| watched(modes[m].component) && changes[m].is_none()).collect();
+    Draft { base, good: view.good, changes, unseen }
+}
+
+fn finished(
+    design: &Design,
+    camera: &Camera,
+    nominal: &Drawn,
+    liaison: &Liaison,
+    modes: &[ErrorMode],
+    Draft { base, good, changes, unseen }: Draft,
+    scenes: &[Vec<usize>],
+) -> Plan {
+    let small = camera.reduced(base);
+    let view = View { drawn: nominal, camera: &small, good };
     let mut nodes: Vec<NodePlan> = (0..design.components.len())
         .filter_map(|component| {
             let own: Vec<usize> =
@@ -93,10 +137,9 @@ pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, liaison: &Liaison
         })
         .collect();
     link(&mut nodes);
-    let scenes = gather(modes, &changes);
-    disturb(&mut nodes, &scenes, &changes);
+    disturb(&mut nodes, scenes, &changes);
     let datum = datum(&view.good, liaison, modes, &changes);
-    Plan { base, good: view.good, nodes, scenes, unseen, datum }
+    Plan { base, good: view.good, nodes, scenes: scenes.to_vec(), unseen, datum }
 }
 
 /// See [`Plan::datum`].
@@ -305,20 +348,34 @@ fn disturb(nodes: &mut [NodePlan], scenes: &[Vec<usize>], changes: &[Option<Mask
     nodes.iter_mut().zip(found).for_each(|(node, disturbed)| node.disturbed = disturbed);
 }
 
-/// Puts every visible mode into the first scene in which no other change comes near.
-fn gather(modes: &[ErrorMode], changes: &[Option<Mask>]) -> Vec<Vec<usize>> {
-    let mut scenes: Vec<(Vec<usize>, Mask)> = Vec::new();
-    for (m, change) in changes.iter().enumerate() {
-        let Some(change) = change else { continue };
-        let wide = dilate(change, 2 * WIDEN);
-        let fits = |(taken, mask): &(Vec<usize>, Mask)| {
-            let apart = !mask.bits.iter().zip(&wide.bits).any(|(a, b)| *a && *b);
-            apart && taken.iter().all(|&t| modes[t].component != modes[m].component)
+/// Puts every visible mode into the first scene in which no other change comes near, in any camera.
+fn gather(modes: &[ErrorMode], cameras: &[&[Option<Mask>]]) -> Vec<Vec<usize>> {
+    let mut scenes: Vec<(Vec<usize>, Vec<Option<Mask>>)> = Vec::new();
+    for (m, mode) in modes.iter().enumerate() {
+        let wide: Vec<Option<Mask>> =
+            cameras.iter().map(|changes| changes[m].as_ref().map(|change| dilate(change, 2 * WIDEN))).collect();
+        if wide.iter().all(Option::is_none) {
+            continue;
+        }
+        let fits = |(taken, masks): &(Vec<usize>, Vec<Option<Mask>>)| {
+            let meet = |(mask, wide): (&Option<Mask>, &Option<Mask>)| {
+                mask.iter().zip(wide).any(|(mask, wide)| mask.bits.iter().zip(&wide.bits).any(|(a, b)| *a && *b))
+            };
+            let apart = !masks.iter().zip(&wide).any(meet);
+            apart && taken.iter().all(|&t| modes[t].component != mode.component)
         };
         match scenes.iter_mut().find(|s| fits(s)) {
-            Some((taken, mask)) => {
+            Some((taken, masks)) => {
                 taken.push(m);
-                mask.bits.iter_mut().zip(&wide.bits).for_each(|(a, b)| *a |= b);
+                for (mask, wide) in masks.iter_mut().zip(wide) {
+                    match (mask.as_mut(), wide) {
+                        (Some(mask), Some(wide)) => {
+                            mask.bits.iter_mut().zip(&wide.bits).for_each(|(a, b)| *a |= b);
+                        }
+                        (None, wide) => *mask = wide,
+                        (Some(_), None) => {}
+                    }
+                }
             }
             None => scenes.push((vec![m], wide)),
         }

@@ -10,7 +10,7 @@ use crate::runtime::model::Node;
 
 /// Share of the lowest goods and the highest faults left out when asking whether they overlap: photos in which the pose
 /// went wrong, which say nothing about the node.
-const TRIM: f64 = 0.1;
+pub(super) const TRIM: f64 = 0.1;
 /// Share of a normal variable more than one standard deviation below its mean.
 const ONE_DEVIATION_DOWN: f64 = 0.16;
 
@@ -28,7 +28,7 @@ pub fn set(node: &mut Node, seen: &Seen, false_reject: f64) {
     for (kind, faulty) in &seen.faulty {
         let own: Vec<usize> = (1..node.hypotheses.len()).filter(|&h| node.hypotheses[h].fault == *kind).collect();
         let least = |against: &Vec<f64>| own.iter().map(|&h| against[h]).fold(f64::INFINITY, f64::min);
-        let limit = threshold(&sorted(&seen.good, least), &sorted(faulty, least), false_reject / modes);
+        let limit = threshold(&sorted(&seen.good, least), &sorted(faulty, least), false_reject / modes, INDEPENDENT);
         own.iter().for_each(|&h| node.hypotheses[h].threshold = rounded(limit));
     }
     let score = |against: &Vec<f64>| rounded(inspect::score(node, against).1);
@@ -47,8 +47,9 @@ fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
 /// zero, the middle between them decides. Else its sign does, less what the promised rate of false rejects takes: of good
 /// renders a share `p0` falls below zero, and from there on likelihood ratios fall off as their own size says (a ratio of Λ is
 /// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap the spread of the goods may allow less than that.
+/// Ratios are natural logarithms, a ratio of 1 being that of `independent` coefficients' worth.
 /// Never a quantile of the goods: their few lowest scores say nothing about a photo's.
-fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
+pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independent: f64) -> f64 {
     if good.is_empty() || fault.is_empty() {
         return 0.0;
     }
@@ -59,7 +60,7 @@ fn threshold(good: &[f64], fault: &[f64], false_reject: f64) -> f64 {
     }
     let middle = at_share(good, 0.5);
     let below_zero = below_zero(middle, middle - at_share(good, ONE_DEVIATION_DOWN));
-    let by_ratio = -(below_zero / false_reject).ln().max(0.0) / INDEPENDENT;
+    let by_ratio = -(below_zero / false_reject).ln().max(0.0) / independent;
     if apart {
         return by_ratio;
     }
@@ -77,7 +78,7 @@ fn below_zero(middle: f64, deviation: f64) -> f64 {
 }
 
 /// The value below which a share of ascending values lies.
-fn at_share(sorted: &[f64], share: f64) -> f64 {
+pub(super) fn at_share(sorted: &[f64], share: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * share).round() as usize]
 }
 
@@ -89,7 +90,7 @@ mod tests {
     fn the_sign_decides_where_renders_lie_apart() {
         let good = [0.2, 0.4, 0.42, 0.45, 0.45, 0.45, 0.48, 0.5, 0.5, 0.5, 0.6];
         let fault = [-0.9, -0.8, -0.8, -0.7, -0.6, -0.5, -0.5, -0.4, -0.3, -0.2, 0.1];
-        assert_eq!(threshold(&good, &fault, 1e-3), 0.0);
+        assert_eq!(threshold(&good, &fault, 1e-3, INDEPENDENT), 0.0);
     }
 
     /// Goods of mean 0.2 and deviation 0.1 fall below zero in 0.5 e^-2 = 6.8 % of photos; one in a thousand is allowed:
@@ -97,24 +98,27 @@ mod tests {
     #[test]
     fn goods_near_zero_lower_it_by_what_the_promise_takes() {
         let good = [0.0, 0.1, 0.1, 0.15, 0.2, 0.2, 0.2, 0.25, 0.3, 0.3, 0.4];
-        let limit = threshold(&good, &[-0.8, -0.7, -0.6, -0.5], 1e-3);
+        let limit = threshold(&good, &[-0.8, -0.7, -0.6, -0.5], 1e-3, INDEPENDENT);
         assert!((limit + (0.5f64 * (-2.0f64).exp() / 1e-3).ln() / 100.0).abs() < 1e-9, "{limit}");
-        assert!(threshold(&good, &[-0.8, -0.7, -0.6, -0.5], 1e-5) < limit, "a stricter promise costs more");
+        assert!(
+            threshold(&good, &[-0.8, -0.7, -0.6, -0.5], 1e-5, INDEPENDENT) < limit,
+            "a stricter promise costs more"
+        );
     }
 
     #[test]
     fn the_middle_decides_where_they_lie_apart_below_zero() {
-        assert!((threshold(&[-0.2, -0.1, 0.0], &[-0.8, -0.7, -0.6], 1e-3) + 0.4).abs() < 1e-9);
-        assert_eq!(threshold(&[0.3, 0.4], &[0.1, 0.2], 1e-3), 0.0);
+        assert!((threshold(&[-0.2, -0.1, 0.0], &[-0.8, -0.7, -0.6], 1e-3, INDEPENDENT) + 0.4).abs() < 1e-9);
+        assert_eq!(threshold(&[0.3, 0.4], &[0.1, 0.2], 1e-3, INDEPENDENT), 0.0);
     }
 
     #[test]
     fn where_they_overlap_the_lesser_of_both_allowances_counts() {
         let narrow = [-0.010, -0.005, 0.0, 0.005, 0.010];
         let by_spread = -3.0902 * 0.005 / 0.6745;
-        assert!((threshold(&narrow, &[-0.02, -0.01, 0.0, 0.01], 1e-3) - by_spread).abs() < 1e-3);
+        assert!((threshold(&narrow, &[-0.02, -0.01, 0.0, 0.01], 1e-3, INDEPENDENT) - by_spread).abs() < 1e-3);
         let wide = [-0.1, -0.05, 0.0, 0.05, 0.1];
         let by_ratio = -(0.5f64 / 1e-3).ln() / 100.0;
-        assert!((threshold(&wide, &[-0.2, -0.1, 0.0, 0.1], 1e-3) - by_ratio).abs() < 1e-9);
+        assert!((threshold(&wide, &[-0.2, -0.1, 0.0, 0.1], 1e-3, INDEPENDENT) - by_ratio).abs() < 1e-9);
     }
 }

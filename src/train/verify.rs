@@ -42,6 +42,7 @@ const POOREST_FIT: f64 = 0.4;
 const LEAST_POWER: f64 = 0.76;
 
 /// A station as some customer might have it.
+#[derive(Clone)]
 pub struct Customer {
     pub installation: Installation,
     /// Before he exposes his camera.
@@ -56,7 +57,9 @@ pub struct Customer {
     pub full_well: f64,
     /// The largest grey value.
     pub deepest: f64,
-    exposing: Exposing,
+    pub(super) exposing: Exposing,
+    /// Number of the camera where the station has several: it scatters on its own.
+    pub camera: u64,
 }
 
 /// Customer number `index`.
@@ -83,6 +86,7 @@ pub fn customer(model: &Model, station: &Station, index: u64) -> Customer {
         full_well: spec.full_well,
         deepest: f64::from((1_u32 << spec.depth.min(16)) - 1),
         exposing: Exposing::new(station),
+        camera: 0,
     }
 }
 
@@ -91,7 +95,7 @@ impl Customer {
     fn expose(&self, shot: &Shot) -> Customer {
         let bright = edges::quantile(&shot.lit(&self.powers), |_| true, EXPOSED_QUANTILE).max(f32::MIN_POSITIVE);
         let gain = self.exposure / f64::from(bright);
-        Customer { powers: self.powers.iter().map(|p| p * gain).collect(), ..*self }
+        Customer { powers: self.powers.iter().map(|p| p * gain).collect(), ..self.clone() }
     }
 }
 
@@ -121,6 +125,9 @@ pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, inde
     let size = model.station.camera.size;
     let mut full = light.magnified(base as usize, size.map(|s| s as usize));
     let width = full.width;
+    if customer.camera > 0 {
+        stream = Stream::new(customer.seed, &format!("sensor {}", customer.camera), index);
+    }
     for (i, value) in full.values.iter_mut().enumerate() {
         let mut v = f64::from(*value).max(0.0);
         if customer.vignetting > 0.0 {
@@ -139,7 +146,7 @@ pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, inde
 pub(super) struct Judged {
     /// How well the calibration photo was re-synthesised.
     correlation: f64,
-    good: Vec<Verdict>,
+    pub good: Vec<Verdict>,
     /// Per scene, per draw.
     pub faulty: Vec<Vec<Verdict>>,
 }
@@ -147,9 +154,11 @@ pub(super) struct Judged {
 /// What the held-out shots of all customers were taken for.
 #[derive(Serialize, Deserialize)]
 pub struct HeldOut {
-    judged: Vec<Judged>,
+    pub(super) judged: Vec<Judged>,
     /// Customers whose calibration photo was refused.
     unfit: usize,
+    /// Per customer, whether it was not.
+    pub(super) fit: Vec<bool>,
 }
 
 /// Judges the held-out shots of each customer, without thresholds yet. The first good shot of each customer calibrates.
@@ -161,18 +170,21 @@ pub fn judge_all(
     modes: &[ErrorMode],
     held_out: &[(Customer, Shots)],
 ) -> HeldOut {
-    let all = |model: &Model| held_out.iter().filter_map(|(c, shots)| judge(model, plan, c, shots)).collect();
-    let mut judged: Vec<Judged> = all(model);
+    let all = |model: &Model| -> (Vec<bool>, Vec<Judged>) {
+        let each: Vec<Option<Judged>> = held_out.iter().map(|(c, shots)| judge(model, plan, c, shots)).collect();
+        (each.iter().map(Option::is_some).collect(), each.into_iter().flatten().collect())
+    };
+    let (mut fit, mut judged) = all(model);
     if forget_blind(model, design, plan, modes, &judged) {
-        judged = all(model);
+        (fit, judged) = all(model);
     }
     let unfit = held_out.len() - judged.len();
-    HeldOut { judged, unfit }
+    HeldOut { judged, unfit, fit }
 }
 
 /// Writes thresholds and promise into the model.
 pub fn settle(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], held_out: &HeldOut) {
-    let HeldOut { judged, unfit } = held_out;
+    let HeldOut { judged, unfit, .. } = held_out;
     set_thresholds(model, design, scenes, modes, judged);
     model.locator.accept = accept(judged, model.locator.unsigned);
     model.station.least_correlation = least_correlation(judged);

@@ -85,9 +85,11 @@ impl Builder {
             Rule::inspect => {
                 Stmt::Inspect { name: inner.find(Rule::name).map(|p| self.name(&p)), body: self.body(inner.last()) }
             }
-            Rule::camera => {
-                Stmt::Camera { mode: inner.find(Rule::mode).map(|p| self.name(&p)), body: self.body(inner.last()) }
-            }
+            Rule::camera => Stmt::Camera {
+                name: inner.find(Rule::camera_name).map(|p| self.name(&p)),
+                mode: inner.find(Rule::mode).map(|p| self.name(&p)),
+                body: self.body(inner.last()),
+            },
             Rule::floor => Stmt::Floor(self.body(inner.last())),
             Rule::vary => Stmt::Vary(self.body(inner.last())),
             Rule::train => Stmt::Train(self.body(inner.last())),
