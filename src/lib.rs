@@ -172,6 +172,9 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
     let camera = line.check((choice.camera, choice.diagnostics.clone()))?;
     line.lock(&design, station, &choice);
     line.emit(Artifact::View, || artifacts::view(&design, station, &choice));
+    if line.options.wanted.contains(&Artifact::Images) {
+        line.enter(Stage::Images)?;
+    }
     line.emit_files(Artifact::Images, || artifacts::images::pictures(&design, station, &camera, &modes()));
 
     line.enter(Stage::Plan)?;
