@@ -190,6 +190,9 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
         found.push(cameras.last().map(|(_, choice)| choice.diagnostics.clone()).unwrap_or_default());
     }
     line.check(((), line::seen_by_none(found)))?;
+    if line.options.wanted.contains(&Artifact::Images) {
+        line.enter(Stage::Images)?;
+    }
     for (index, choice) in &cameras {
         let station = &design.stations[*index];
         line.lock(&design, station, choice);

@@ -108,6 +108,8 @@ pub enum Stage {
     Solid,
     Assembly,
     View,
+    /// Pictures of the correct assembly and of every fault, where they are wanted.
+    Images,
     Plan,
     Render,
     Fit,
@@ -117,11 +119,12 @@ pub enum Stage {
 
 impl Stage {
     /// In running order.
-    pub const ALL: [Stage; 9] = [
+    pub const ALL: [Stage; 10] = [
         Stage::Design,
         Stage::Solid,
         Stage::Assembly,
         Stage::View,
+        Stage::Images,
         Stage::Plan,
         Stage::Render,
         Stage::Fit,
@@ -135,6 +138,7 @@ impl Stage {
             Stage::Solid => "solid",
             Stage::Assembly => "assembly",
             Stage::View => "view",
+            Stage::Images => "images",
             Stage::Plan => "plan",
             Stage::Render => "render",
             Stage::Fit => "fit",

@@ -105,7 +105,8 @@ impl Artifact {
             | Artifact::Measures
             | Artifact::Gltf
             | Artifact::Exploded => Stage::Assembly,
-            Artifact::View | Artifact::Images => Stage::View,
+            Artifact::View => Stage::View,
+            Artifact::Images => Stage::Images,
             Artifact::Model => Stage::Verify,
         }
     }

@@ -261,4 +261,21 @@ mod tests {
         assert_eq!(found[0].help.as_deref(), Some("rz = 0 ±0.0063 deg"));
         assert!(found[0].labels[0].text.contains("0.0040 mm of clearance is left"), "{}", found[0].labels[0].text);
     }
+
+    #[test]
+    fn pieces_of_one_part_are_told_of_once() {
+        let mut shop = sample::Shop::default();
+        let holes = [-6.0, 0.0, 6.0].map(|x| sample::Cut::hole("hole", x, 0.0, 4.0, 0.0));
+        let plate = shop.plate("plate", [5.0, 0.0], [30.0, 0.0], &holes);
+        shop.place("plate", plate, [0.0; 3], 0.0, 0.0);
+        for (k, x) in [-6.0, 0.0, 6.0].into_iter().enumerate() {
+            let pin = shop.pin("pin", &[("shank", 4.0, 4.0, [-0.01, 0.01], 10.0)]);
+            shop.place(&format!("pin[{}]", k + 1), pin, [x, 0.0, 0.0], 0.0, 0.0);
+        }
+        let a = shop.finish();
+        let (_, found) = analyse(&a.design, &a.solids);
+        let codes: Vec<_> = found.iter().map(|d| d.code).collect();
+        assert_eq!(codes, ["W0502"], "{found:?}");
+        assert_eq!(found[0].notes, ["so can `pin[2]`, `pin[3]`"]);
+    }
 }

@@ -2,12 +2,14 @@
 //!
 //! In: liaisons, insertion order and solids. Out: per watched component its modes (missing, not seated, misplaced, wrong
 //! part), each a motion with a range of sizes, and for a size the pose it leads to. All other components stay
-//! where they are, but for loose ones that a misplaced part pushes down.
+//! where they are, but for loose ones that a misplaced part pushes down, and those that rested on a missing one: they are
+//! as often found lower as where they were, because a thread or a tight fit may hold them.
 
 use super::insertion::Insertion;
 use super::liaison::Liaison;
 use super::piece;
 use super::place::place;
+use super::sink::{Sink, sink};
 use super::turn::{Turn, Turning, turns};
 use crate::design::model::{Design, Expr, Values};
 use crate::solid::{Solid, Surface};
@@ -39,6 +41,8 @@ impl FaultKind {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Motion {
     Remove,
+    /// As [`Motion::Remove`], from under others, which may come down.
+    RemoveUnder(Sink),
     /// Short of its seat along its removal direction (unit vector) by `from`..`to` mm.
     Slide {
         direction: [f64; 3],
@@ -82,6 +86,8 @@ pub struct Faulted {
 const SMALLEST: f64 = 0.8;
 /// The largest that is looked for (mm): what stands higher is as easy to see.
 const LARGEST: f64 = 4.0;
+/// The share of cases in which what rested on a missing part stays where it was.
+const STAYS: f64 = 0.5;
 /// A part lifted by less than this (mm) lies where it should.
 const LYING: f64 = 0.05;
 /// A part thicker than a hole by less than this (mm) is taken to enter it.
@@ -97,7 +103,8 @@ pub fn modes(design: &Design, liaison: &Liaison, insertion: &Insertion, solids: 
         let turning = zone.map(|zone| Turning { component, insertion, liaison, solids, poses: &poses, zone });
         let turns = turning.map(|of| turns(&of, SMALLEST)).unwrap_or_default();
         let turns = turns.into_iter().map(|t| (FaultKind::Misplaced, Motion::Turn(t)));
-        let motions = [(FaultKind::Missing, Motion::Remove)].into_iter().chain(slide).chain(turns);
+        let remove = sink(component, insertion, liaison, solids, &poses).map_or(Motion::Remove, Motion::RemoveUnder);
+        let motions = [(FaultKind::Missing, remove)].into_iter().chain(slide).chain(turns);
         motions.map(move |(kind, motion)| ErrorMode { component, kind, motion }).collect::<Vec<_>>()
     };
     watched.flat_map(of_one).collect()
@@ -123,11 +130,15 @@ pub fn wrong_parts(design: &Design, liaison: &Liaison, solids: &[Arc<Solid>]) ->
 }
 
 /// The fault at a size: `u` in 0..1 picks it within the mode's range (`u[0]` the size; `u[1]` how far loose components give
-/// way under a misplaced part). `solids` and `poses` hold one entry per component, of the same draw.
+/// way under a misplaced part, and whether what rested on a missing one comes down). `solids` and `poses` hold one entry per component, of the same draw.
 pub fn apply(mode: &ErrorMode, u: [f64; 3], solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Faulted {
     let pose = poses[mode.component];
     match &mode.motion {
         Motion::Remove => Faulted { pose: None, ..still(pose, "missing") },
+        Motion::RemoveUnder(sink) => {
+            let pushed = if u[1] < STAYS { Vec::new() } else { sink.moved(poses) };
+            Faulted { pose: None, pushed, ..still(pose, "missing") }
+        }
         Motion::Slide { direction, from, to } => {
             let size = from + (to - from) * u[0];
             let moved = Translation3::from(Vector3::from(*direction) * size) * pose;

@@ -78,14 +78,20 @@ impl Liaison {
 
     /// Whether a component stands on another, seen along its removal direction.
     pub fn rests(&self, component: usize, direction: Unit<Vector3<f64>>) -> bool {
-        self.of(component).any(|c| match c.kind {
+        self.bearers(component, direction).next().is_some()
+    }
+
+    /// The components that it stands on, seen along its removal direction; one may come several times.
+    pub fn bearers(&self, component: usize, direction: Unit<Vector3<f64>>) -> impl Iterator<Item = usize> {
+        let bears = move |c: &&Contact| match c.kind {
             ContactKind::Cylinder => false,
             ContactKind::Plane | ContactKind::Tangent => {
                 let out = if c.a.component == component { 1.0 } else { -1.0 };
                 out * c.direction.dot(&direction) < -FACING
             }
             ContactKind::Cone | ContactKind::Sphere | ContactKind::Torus => true,
-        })
+        };
+        self.of(component).filter(bears).map(move |c| c.other(component))
     }
 }
 

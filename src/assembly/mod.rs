@@ -11,6 +11,7 @@ pub mod liaison;
 pub mod measure;
 pub mod piece;
 pub mod place;
+pub mod sink;
 pub mod turn;
 
 mod blocking;

@@ -1,7 +1,7 @@
 //! Interference within tolerance, with the dimension that would cure it (W0502).
 //!
-//! In: contacts whose faces can enter each other and what each dimension takes at the worst. Out: one warning per component
-//! and kind, for the contact where most is missing. What is offered as a cure is worked out, never guessed: a limit that
+//! In: contacts whose faces can enter each other and what each dimension takes at the worst. Out: one warning per placement
+//! and kind, for the contact where most is missing; a note names the other copies. What is offered as a cure is worked out, never guessed: a limit that
 //! alone leaves no interference, cut so that pasting it is safe.
 
 use super::check::{face_name, full, hollow};
@@ -12,7 +12,7 @@ use crate::design::model::{Design, DimId, Expr};
 use crate::diag::{Diagnostic, Span};
 use crate::solid::Solid;
 use crate::units::Quantity;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Planes that can enter each other by less than this (mm) are not worth a warning.
@@ -25,7 +25,7 @@ const NAMED: usize = 4;
 /// W0502, in the order of the components whose placement is most to blame.
 pub(crate) fn warnings(design: &Design, solids: &[Arc<Solid>], liaison: &Liaison, tight: &[Tight]) -> Vec<Diagnostic> {
     let axes = axes(design);
-    let mut worst: BTreeMap<Told, (usize, Case)> = BTreeMap::new();
+    let mut worst: BTreeMap<Told, Worst> = BTreeMap::new();
     for tight in tight {
         let Some(contact) =
             liaison.between(tight.a.component, tight.b.component).find(|c| c.a == tight.a && c.b == tight.b)
@@ -38,24 +38,50 @@ pub(crate) fn warnings(design: &Design, solids: &[Arc<Solid>], liaison: &Liaison
             continue;
         }
         let owner = case.owner();
-        // Pieces of one part that rest alike are told of once.
-        let key = if flat { Told::Flat(&design.parts[design.components[owner].part].name) } else { Told::Round(owner) };
-        if worst.get(&key).is_none_or(|(_, known)| known.missing < case.missing - SAME) {
-            worst.insert(key, (owner, case));
+        // Pieces of one part that rest alike are told of once, and so are copies of one placement.
+        let component = &design.components[owner];
+        let part = &design.parts[component.part].name;
+        let key = if flat { Told::Flat(part) } else { Told::Round(component.span.file, component.span.start, part) };
+        let found = worst.entry(key).or_insert_with(|| Worst { owner, case, alike: BTreeSet::new() });
+        found.alike.insert(owner);
+        if found.case.missing < case.missing - SAME {
+            (found.owner, found.case) = (owner, case);
         }
     }
-    let mut worst: Vec<(usize, bool, Case)> =
-        worst.into_iter().map(|(told, (owner, case))| (owner, matches!(told, Told::Flat(_)), case)).collect();
-    worst.sort_by_key(|(owner, flat, _)| (*flat, *owner));
-    worst.iter().map(|(owner, flat, case)| case.diagnostic(design, solids, *owner, *flat)).collect()
+    let mut worst: Vec<(bool, Worst)> = worst.into_iter().map(|(told, w)| (matches!(told, Told::Flat(_)), w)).collect();
+    worst.sort_by_key(|(flat, w)| (*flat, w.owner));
+    worst.iter().map(|(flat, w)| w.diagnostic(design, solids, *flat)).collect()
 }
 
 /// What one warning is for.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Told<'a> {
-    Round(usize),
+    /// Where the placement is written, and of which part.
+    Round(u32, u32, &'a str),
     /// A part by name.
     Flat(&'a str),
+}
+
+/// The worst case of one warning.
+struct Worst<'a> {
+    owner: usize,
+    case: Case<'a>,
+    /// All components that have such a case.
+    alike: BTreeSet<usize>,
+}
+
+impl Worst<'_> {
+    fn diagnostic(&self, design: &Design, solids: &[Arc<Solid>], flat: bool) -> Diagnostic {
+        let told = self.case.diagnostic(design, solids, self.owner, flat);
+        let others = self.alike.iter().filter(|c| **c != self.owner);
+        let others: Vec<String> = others.map(|c| format!("`{}`", design.components[*c].name)).collect();
+        let few = others.len().min(NAMED);
+        match others.len() {
+            0 => told,
+            n if n > few => told.note(format!("so can {} and {} others", others[..few].join(", "), n - few)),
+            _ => told.note(format!("so can {}", others.join(", "))),
+        }
+    }
 }
 
 /// The axis of a component's placement (0..3 along, 3..6 about) that each dimension is.
@@ -78,6 +104,7 @@ fn axes(design: &Design) -> Axes {
 }
 
 /// A contact whose faces can enter each other.
+#[derive(Clone, Copy)]
 struct Case<'a> {
     contact: &'a Contact,
     shares: &'a [Share],

@@ -78,14 +78,15 @@ pub(crate) struct Turning<'a> {
 }
 
 /// The turns that lift a component by `least` mm or more, and those at which it finds another seat and looks different.
-/// A part that others hold down can only be in another seat: were it lifted, its error would show as theirs.
+/// A part that others hold down is not lifted: its error would show as theirs.
 pub(crate) fn turns(of: &Turning, least: f64) -> Vec<Turn> {
     let direction = of.insertion.direction(of.component);
     let axes = Axis::candidates(&of.solids[of.component], &of.poses[of.component], direction);
     let trials: Vec<Trial> = axes.iter().map(|axis| Trial::new(of, *axis)).collect();
     let free = of.insertion.is_free(of.component);
     let lifted = trials.iter().filter(|_| free).find_map(|t| t.turn(t.lifted(least), false));
-    let unstopped = free && lifted.is_none();
+    // Held down or not: what lies as low as it should and clears what stands above may be turned.
+    let unstopped = lifted.is_none();
     let plain = trials.iter().filter(|_| unstopped).find_map(|t| t.turn(t.plain(), false));
     let stopped = plain.is_none();
     let seated = trials.iter().filter(|_| stopped).find_map(|t| t.turn(t.seats(), true));

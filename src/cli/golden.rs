@@ -276,7 +276,7 @@ fn stages(args: &GoldenArgs, blessed: &BTreeMap<String, Vec<u8>>) -> BTreeSet<Ar
     if !args.stages.is_empty() {
         return args.stages.iter().copied().collect();
     }
-    let quick = |a: &Artifact| a.is_reviewed() && a.stage() <= Stage::View && *a != Artifact::Images;
+    let quick = |a: &Artifact| a.is_reviewed() && a.stage() <= Stage::View;
     Artifact::ALL.into_iter().filter(quick).chain(blessed.keys().filter_map(|file| stage_of(file))).collect()
 }
 

@@ -14,7 +14,7 @@ use super::touching::part_chords;
 use super::{Edge, Face, Quality, Solid, Surface, TriMesh};
 use crate::diag::Diagnostic;
 use nalgebra::{Point3, Unit, Vector3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
 type Faults = Vec<Diagnostic>;
@@ -448,10 +448,12 @@ fn check_shells(
         parent[a.min(b)] = a.max(b);
     }
     let mut shells: BTreeMap<usize, (f64, i64)> = BTreeMap::new();
+    let mut leaves: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
     for (i, draft) in drafts.iter().enumerate() {
         let shell = shells.entry(root(&parent, i)).or_default();
         shell.0 += fluxes[i].volume;
         shell.1 += draft.euler;
+        leaves.entry(root(&parent, i)).or_default().insert(draft.owner.0);
     }
     let mut seen = vec![false; vertices.len()];
     for edge in edges {
@@ -464,22 +466,35 @@ fn check_shells(
     if let Some((_, euler)) = shells.values().find(|(_, euler)| euler % 2 != 0 || *euler > 2) {
         return Err(vec![internal(tree, &format!("a shell has Euler number {euler}"))]);
     }
-    let volumes: Vec<f64> = shells.values().map(|s| s.0).collect();
-    in_one_piece(tree, &volumes)?;
-    Ok(volumes)
+    let shells: Vec<(f64, BTreeSet<usize>)> = shells.values().map(|s| s.0).zip(leaves.into_values()).collect();
+    in_one_piece(tree, &shells)?;
+    Ok(shells.into_iter().map(|(volume, _)| volume).collect())
 }
 
-fn in_one_piece(tree: &Tree, volumes: &[f64]) -> Result<(), Faults> {
-    let mut bodies: Vec<f64> = volumes.iter().copied().filter(|v| *v > 0.0).collect();
-    bodies.sort_by(f64::total_cmp);
-    match bodies.len() {
-        0 => Err(vec![internal(tree, "it encloses no volume")]),
-        1 => Ok(()),
-        n => {
-            let message = format!("`{}` falls into {n} bodies; the smallest is {:.3} mm³", tree.part.name, bodies[0]);
-            Err(vec![Diagnostic::error("E0405", tree.part.span, message)])
-        }
+/// Of every shell its volume and the features that its faces come from.
+fn in_one_piece(tree: &Tree, shells: &[(f64, BTreeSet<usize>)]) -> Result<(), Faults> {
+    let mut bodies: Vec<&(f64, BTreeSet<usize>)> = shells.iter().filter(|(volume, _)| *volume > 0.0).collect();
+    bodies.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let Some(((volume, own), others)) = bodies.split_first() else {
+        return Err(vec![internal(tree, "it encloses no volume")]);
+    };
+    if others.is_empty() {
+        return Ok(());
     }
+    let message =
+        format!("`{}` falls into {} bodies; the smallest is {volume:.3} mm³", tree.part.name, others.len() + 1);
+    let fault = Diagnostic::error("E0405", tree.part.span, message);
+    let elsewhere = |leaf: &usize| others.iter().any(|(_, leaves)| leaves.contains(leaf));
+    let named = |adds: bool, shared: bool, text: &'static str| {
+        let mut fit = own.iter().filter(move |l| tree.leaves[**l].adds == adds && elsewhere(l) == shared);
+        fit.next().map(|l| (tree.leaves[*l].span, format!("`{}` {text}", tree.leaves[*l].name)))
+    };
+    // A feature of its own floats beside the rest, or a cut that both sides show goes all the way across.
+    let culprit = named(true, false, "touches none of the others").or_else(|| named(false, true, "cuts it off"));
+    Err(vec![match culprit {
+        Some((span, text)) => fault.also(span, text),
+        None => fault,
+    }])
 }
 
 /// Forgets surfaces without a face.

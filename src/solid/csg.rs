@@ -100,7 +100,7 @@ pub(super) struct Leaf {
     pub formula: Formula,
     pub bounds: Bounds,
     /// Whether it is material that was added, rather than cut or kept.
-    adds: bool,
+    pub adds: bool,
 }
 
 /// A box along the part's axes.

@@ -365,6 +365,17 @@ fn faults_have_codes() {
 }
 
 #[test]
+fn the_body_that_stands_apart_is_named() {
+    let told = |features| {
+        let faults = evaluate(&part(features), &[], &Quality::default()).map(|s| s.volume).unwrap_err();
+        faults[0].labels[1].text.clone()
+    };
+    let slab = || one("slab", Op::Add, block(10.0, 10.0, 2.0), 0.0);
+    assert_eq!(told(vec![slab(), one("lid", Op::Add, block(4.0, 4.0, 1.0), 2.5)]), "`lid` touches none of the others");
+    assert_eq!(told(vec![slab(), one("saw", Op::Cut, through(block(1.0, 20.0, 0.0)), 0.0)]), "`saw` cuts it off");
+}
+
+#[test]
 fn a_cut_that_misses_changes_nothing() {
     let s = solid(vec![
         one("slab", Op::Add, block(10.0, 10.0, 2.0), 0.0),
