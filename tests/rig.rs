@@ -87,7 +87,9 @@ fn each_camera_knows_what_it_sees() {
 fn warnings_are_about_the_cameras_together() {
     let doubts = COMPILED.diagnostics.iter().filter(|d| ["W0602", "W0703"].contains(&d.code));
     let said: Vec<&str> = doubts.map(|d| d.message.as_str()).collect();
-    assert_eq!(said, ["station `line` can hardly tell when `pin[1]` is not seated"]);
+    // Of the other pin some slight ones may pass at this resolution.
+    assert!(said.contains(&"station `line` can hardly tell when `pin[1]` is not seated"), "{said:?}");
+    assert!(said.iter().all(|m| m.ends_with("not seated")), "{said:?}");
     assert!(!COMPILED.diagnostics.iter().any(|d| d.code == "E0601"), "the wall hides a pin from one camera only");
 }
 
@@ -104,7 +106,7 @@ fn the_promise_is_of_the_joint_verdict() {
     assert_eq!(escaped(HIDDEN, "missing"), Some(0), "{promise:?}");
     assert_eq!(escaped(OPEN, "missing"), Some(0), "{promise:?}");
     assert!(escaped(OPEN, "not seated").is_some_and(|e| e <= 2), "{promise:?}");
-    assert!(escaped(HIDDEN, "not seated").is_none_or(|e| e > 2), "{promise:?}");
+    assert!(escaped(HIDDEN, "not seated").is_some_and(|e| e > 5), "{promise:?}");
     assert!(promise.false_reject.events <= 2, "{promise:?}");
 }
 
@@ -173,7 +175,7 @@ fn a_component_outside_one_photo_is_left_to_the_others() {
 
 #[test]
 fn a_photo_with_a_fault_does_not_calibrate() {
-    let refused = joint::calibrate(rig(), &[assembly(&format!("{OPEN} missing"))]).unwrap_err().to_string();
+    let refused = joint::calibrate(rig(), &[assembly(&format!("{OPEN} not seated"))]).unwrap_err().to_string();
     assert!(refused.starts_with("E0808: ") && refused.contains(OPEN), "{refused}");
     let refused = joint::calibrate(rig(), &[]).unwrap_err().to_string();
     assert!(refused.starts_with("E0806: camera top: "), "{refused}");
