@@ -66,7 +66,9 @@ pub fn find(ground: &Ground, surface: &Surface, count: usize) -> Vec<EdgePoint> 
         let near = edge_point(&camera, &ground.home, points[index]?, [*x as f64, *y as f64], mean[index])?;
         settled(&camera, &ground.home, &fields, near, points[index]?, mean[index])
     };
-    sure(thinned.iter().filter_map(point).collect())
+    let settled: Vec<(EdgePoint, f64)> = thinned.iter().filter_map(point).collect();
+    // Alternatives are compared by their number of points too: none may lose more of them than another.
+    if ground.unsigned { settled.into_iter().map(|(point, _)| point).collect() } else { sure(settled) }
 }
 
 /// The points whose place scatters little from shot to shot: on a wide rounding the light decides where an edge is. At least

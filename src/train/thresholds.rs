@@ -46,7 +46,8 @@ fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
 /// The log-likelihood ratio below which a node counts as faulty in one way. Where good and faulty renders lie apart but below
 /// zero, the middle between them decides. Else its sign does, less what the promised rate of false rejects takes: of good
 /// renders a share `p0` falls below zero, and from there on likelihood ratios fall off as their own size says (a ratio of Λ is
-/// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap the spread of the goods may allow less than that.
+/// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap, the spread of the goods decides: it may allow less than
+/// that, and more where the renders belie the ratios.
 /// Ratios are natural logarithms, a ratio of 1 being that of `independent` coefficients' worth.
 /// Never a quantile of the goods: their few lowest scores say nothing about a photo's.
 pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independent: f64) -> f64 {
@@ -69,7 +70,7 @@ pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independ
     // The median distance of a normal variable from its mean is 0.6745 standard deviations.
     let deviation = at_share(&distances, 0.5) / 0.6745;
     let by_spread = (middle - normal_quantile(1.0 - false_reject) * deviation).min(0.0);
-    by_spread.max(by_ratio)
+    if lowest < by_ratio { by_spread } else { by_spread.max(by_ratio) }
 }
 
 /// Share of a normal variable below zero, from its mean and its deviation downwards: Chernoff's bound, halved.
@@ -113,12 +114,14 @@ mod tests {
     }
 
     #[test]
-    fn where_they_overlap_the_lesser_of_both_allowances_counts() {
-        let narrow = [-0.010, -0.005, 0.0, 0.005, 0.010];
-        let by_spread = -3.0902 * 0.005 / 0.6745;
-        assert!((threshold(&narrow, &[-0.02, -0.01, 0.0, 0.01], 1e-3, INDEPENDENT) - by_spread).abs() < 1e-3);
-        let wide = [-0.1, -0.05, 0.0, 0.05, 0.1];
-        let by_ratio = -(0.5f64 / 1e-3).ln() / 100.0;
-        assert!((threshold(&wide, &[-0.2, -0.1, 0.0, 0.1], 1e-3, INDEPENDENT) - by_ratio).abs() < 1e-9);
+    fn where_they_overlap_the_spread_of_the_goods_decides() {
+        let limit = |good: &[f64]| threshold(good, &[-0.2, -0.1, 0.0, 0.1], 1e-3, INDEPENDENT);
+        let (by_spread, by_ratio) = (|deviation: f64| -3.0902 * deviation / 0.6745, -(0.5f64 / 1e-3).ln() / 100.0);
+        assert!(
+            (limit(&[-0.010, -0.005, 0.0, 0.005, 0.010]) - by_spread(0.005)).abs() < 1e-3,
+            "less than the ratio takes"
+        );
+        assert!((limit(&[-0.05, -0.05, 0.0, 0.05, 0.05]) - by_ratio).abs() < 1e-9, "no more than the ratio takes");
+        assert!((limit(&[-0.1, -0.05, 0.0, 0.05, 0.1]) - by_spread(0.05)).abs() < 1e-3, "renders belie the ratio");
     }
 }
