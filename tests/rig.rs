@@ -96,9 +96,9 @@ fn warnings_are_about_the_cameras_together() {
 #[test]
 fn the_promise_is_of_the_joint_verdict() {
     let promise = &rig().promise;
-    // Two customers with twelve goods each beside that for calibration, and five of every fault that any camera shows.
-    assert_eq!(promise.false_reject.trials, 24);
-    assert!(promise.modes.iter().all(|m| m.escape.trials == 10), "{promise:?}");
+    // Six customers with five goods each beside that for calibration, and two of every fault that any camera shows.
+    assert_eq!(promise.false_reject.trials, 30);
+    assert!(promise.modes.iter().all(|m| m.escape.trials == 12), "{promise:?}");
     let escaped = |component: &str, fault: &str| {
         let of = promise.modes.iter().find(|m| m.component == component && m.fault == fault);
         of.map(|m| m.escape.events)
@@ -201,7 +201,8 @@ fn files_are_read_as_written_and_not_taken_for_one_another() {
 
 #[test]
 fn what_does_not_fit_together_is_refused() {
-    let breaks: [(&str, fn(&mut Rig)); 9] = [
+    type Break = fn(&mut Rig);
+    let breaks: [(&str, Break); 9] = [
         ("a camera that is not there", |rig| rig.components[0].modes[0].seen[0].camera = 7),
         ("a mode nobody knows", |rig| rig.components[0].modes[0].fault = "stolen".into()),
         ("a component nobody knows", |rig| rig.components[0].name = "ghost".into()),

@@ -227,9 +227,8 @@ impl Desk<'_> {
     /// Judges an assembly, unless a photo is none yet and there is time to wait.
     fn take_if_complete(&mut self, found: &[Option<(PathBuf, Vec<u8>)>], patient: bool) -> Result<bool, Failure> {
         let start = Instant::now();
-        let decode = |(camera, found): (usize, &Option<(PathBuf, Vec<u8>)>)| match found {
-            Some((_, bytes)) => Some(self.decode(camera, bytes)),
-            None => None,
+        let decode = |(camera, found): (usize, &Option<(PathBuf, Vec<u8>)>)| {
+            found.as_ref().map(|(_, bytes)| self.decode(camera, bytes))
         };
         let photos: Vec<Option<Result<Photo, PhotoError>>> = found.iter().enumerate().map(decode).collect();
         if patient && photos.iter().any(|photo| matches!(photo, Some(Err(PhotoError::Unreadable(_))))) {
