@@ -157,6 +157,7 @@ mod tests {
             against: Vec::new(),
             best_fault: "missing".into(),
             inside: 1.0,
+            unlike: Default::default(),
             strangeness: 0.0,
             faulty,
             explained: false,

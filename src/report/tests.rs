@@ -61,6 +61,7 @@ fn verdict() -> Verdict {
         against: vec![0.0, -1.0],
         best_fault: SPITE.into(),
         inside: 1.0,
+        unlike: Default::default(),
         strangeness: 0.0,
         faulty: true,
         explained: false,

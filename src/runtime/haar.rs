@@ -42,6 +42,12 @@ impl Integral {
         [((b + d - a - c) * share) as f32, ((c + d - a - b) * share) as f32]
     }
 
+    /// Sum over the pixels from a corner (inclusive) to another (exclusive).
+    pub fn between(&self, [x0, y0]: [usize; 2], [x1, y1]: [usize; 2]) -> f64 {
+        let at = |x: usize, y: usize| self.sums[y * self.width + x];
+        at(x1, y1) - at(x0, y1) - at(x1, y0) + at(x0, y0)
+    }
+
     /// Sum over the cell of side `2 * half` centred on the pixel corner (x, y).
     pub fn sum(&self, x: usize, y: usize, half: usize) -> f64 {
         let at = |x: usize, y: usize| self.sums[y * self.width + x];

@@ -15,15 +15,12 @@ use super::model::{Model, Node};
 use super::photo::Photo;
 use super::pose::Pose;
 use super::settle::{self, Expected};
+use super::strange::{self, Unlikeness};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 /// A node of which less is inside the photo cannot be judged.
 pub(super) const LEAST_INSIDE: f64 = 0.6;
-/// Strangeness of a square in which every coefficient is three standard deviations off (Student's t, five degrees).
-const STRANGE: f64 = 3.09;
-/// Weight of the middle strangeness of the photo's nodes in what one may have.
-const COMMON: f64 = 2.0;
 /// Below this share of the calibration's score the assembly counts as not found.
 const LEAST_SCORE: f64 = 0.5;
 
@@ -70,7 +67,9 @@ pub struct NodeReport {
     /// The error mode that fits best.
     pub best_fault: String,
     pub inside: f64,
-    /// How unlike its good state the node is where it is least like it (see [`Evidence::strangeness`]).
+    /// How unlike its good state the node is where it is least like it (see [`Evidence::unlike`]).
+    pub unlike: Unlikeness,
+    /// By how many standard deviations that is more than correct assemblies show (see [`strange::weigh`]).
     pub strangeness: f64,
     pub faulty: bool,
     /// Faulty by itself, but explained by another component's fault.
@@ -101,6 +100,8 @@ pub struct Inspector<'a> {
     prepared: Prepared,
     light: Light,
     densities: Vec<Vec<Density>>,
+    /// How unlike their rendered good state the nodes were in the calibration photos, the mean of these.
+    calibrated: Vec<Option<Unlikeness>>,
     /// Where calibration expects the nodes; `None` before there is any.
     expected: Option<Vec<Expected>>,
 }
@@ -121,15 +122,21 @@ impl<'a> Inspector<'a> {
         let light = light(&model, &calibration.lamps);
         let references = |node: usize| calibration.references.iter().map(|r| r.window(node)).collect::<Vec<_>>();
         let densities = |(i, n): (usize, &NodeImages)| n.densities(&light, calibration.noise, &references(i));
-        let densities = prepared.nodes.iter().enumerate().map(densities).collect();
+        let (densities, unlike): (_, Vec<Vec<Unlikeness>>) = prepared.nodes.iter().enumerate().map(densities).unzip();
+        let calibrated = unlike.iter().map(|all| strange::mean(all)).collect();
         let camera = calibration.installation.apply(&model.station.camera);
         let search = Search::new(&model);
         let expected = expected(&model, &calibration);
-        Some(Inspector { model, calibration, camera, search, prepared, light, densities, expected })
+        Some(Inspector { model, calibration, camera, search, prepared, light, densities, calibrated, expected })
     }
 
     pub fn model(&self) -> &Model {
         &self.model
+    }
+
+    /// Per node how unlike its rendered good state it was in the calibration photos; `None` before there is any.
+    pub fn calibrated(&self) -> &[Option<Unlikeness>] {
+        &self.calibrated
     }
 
     /// Judges one photo.
@@ -173,24 +180,22 @@ impl<'a> Inspector<'a> {
         let evidence = self.evidence(photo, &found.pose);
         let mut nodes: Vec<NodeReport> =
             (0..evidence.len()).map(|i| self.report(i, &evidence[i], &found.pose)).collect();
+        strange::weigh(&mut nodes, &self.model.nodes, &self.calibrated);
         let disturbed = self.disturbed(&nodes, photo, &found.pose);
         let order = self.blame(&mut nodes, &evidence, &disturbed);
-        let findings: Vec<Finding> = order.iter().map(|&i| self.finding(i, &nodes[i])).collect();
+        let mut findings: Vec<Finding> = order.iter().map(|&i| self.finding(i, &nodes[i])).collect();
         let hidden = nodes.iter().find(|n| n.inside < LEAST_INSIDE);
-        let (decision, reason) = match (&findings[..], hidden, strange(&nodes)) {
-            ([], None, None) => (Decision::Go, String::new()),
-            ([], Some(node), _) => {
+        if findings.is_empty() && hidden.is_none() {
+            let unknown = |i: usize| Finding { fault: strange::UNKNOWN.into(), ..self.finding(i, &nodes[i]) };
+            findings.extend(strange::strangest(&nodes).map(unknown));
+        }
+        let (decision, reason) = match (&findings[..], hidden) {
+            ([], None) => (Decision::Go, String::new()),
+            ([], Some(node)) => {
                 let share = 100.0 * node.inside;
                 (Decision::CannotInspect, format!("only {share:.0} % of {} lies inside the photo", node.name))
             }
-            ([], None, Some(node)) => {
-                let why = format!(
-                    "{} looks like nothing the model knows: neither as it should nor as when faulty",
-                    node.name
-                );
-                (Decision::CannotInspect, why)
-            }
-            (findings, ..) => (Decision::NoGo, summary(findings)),
+            (findings, _) => (Decision::NoGo, summary(findings)),
         };
         Verdict {
             decision,
@@ -256,7 +261,8 @@ impl<'a> Inspector<'a> {
             against,
             best_fault: fault.map_or_else(String::new, |h| node.hypotheses[h].fault.clone()),
             inside: evidence.inside,
-            strangeness: evidence.strangeness,
+            unlike: evidence.unlike,
+            strangeness: 0.0,
             // What is no number is no proof of anything.
             faulty: score.is_nan() || score < 0.0,
             explained: false,
@@ -352,16 +358,6 @@ impl<'a> Inspector<'a> {
         };
         depth(nominal, &self.prepared.home) / depth(&self.camera, pose) * self.camera.focal / nominal.focal
     }
-}
-
-/// The node that is least like its good state, if some part of it is farther from it than noise and what the photo's other
-/// nodes have in common (a model that is not quite this station's) can bring it. A lone node has nothing to be held against.
-pub(super) fn strange(nodes: &[NodeReport]) -> Option<&NodeReport> {
-    let mut rising: Vec<&NodeReport> = nodes.iter().collect();
-    rising.sort_by(|a, b| a.strangeness.total_cmp(&b.strangeness));
-    let (worst, others) = rising.split_last()?;
-    let common = others.get(others.len() / 2)?.strangeness;
-    (worst.strangeness > STRANGE + COMMON * common).then_some(worst)
 }
 
 fn expected(model: &Model, calibration: &Calibration) -> Option<Vec<Expected>> {

@@ -16,6 +16,7 @@ use super::model::Model;
 use super::photo::Photo;
 use super::report::Outcome;
 use super::rig::{Component, Mode, Rig, RigCalibration, Seen, camera_name, hypotheses};
+use super::strange;
 use std::borrow::Cow;
 use std::fmt;
 
@@ -138,14 +139,14 @@ fn trouble(rig: &Rig, components: &[Weighed], views: &[&Verdict]) -> Option<Stri
         let what = format!("only {share:.0} % of {} lies inside the photo, too little to tell", of.name);
         Some(format!("camera {}: {what} whether it is {}", names[out], mode.fault))
     };
-    let strange = |(view, name): (&&Verdict, &&str)| {
+    let odd = |(view, name): (&&Verdict, &&str)| {
         let inside: Vec<NodeReport> = view.nodes.iter().filter(|n| n.inside >= LEAST_INSIDE).cloned().collect();
-        let node = inspect::strange(&inside)?;
+        let node = &inside[strange::strangest(&inside)?];
         let what = "looks like nothing the model knows: neither as it should nor as when faulty";
         Some(format!("camera {name}: {} {what}", node.name))
     };
     let untold = rig.components.iter().zip(components).find_map(untold);
-    untold.or_else(|| views.iter().zip(&names).find_map(strange))
+    untold.or_else(|| views.iter().zip(&names).find_map(odd))
 }
 
 impl<'a> RigInspector<'a> {
@@ -264,6 +265,7 @@ impl<'a> RigInspector<'a> {
                 against: Vec::new(),
                 best_fault: of.modes.get(weighed.best).map_or_else(String::new, |m| m.fault.clone()),
                 inside: nodes().map(|n| n.inside).fold(0.0, f64::max),
+                unlike: Default::default(),
                 strangeness: nodes().map(|n| n.strangeness).fold(0.0, f64::max),
                 faulty: weighed.is_faulty(),
                 explained: weighed.is_faulty() && !blamed.contains(&i),

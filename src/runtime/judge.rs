@@ -10,6 +10,7 @@ use super::look::{Look, Shifted};
 use super::model::{Image, Model, Node};
 use super::pose::Pose;
 use super::settle::Expected;
+use super::strange::Unlikeness;
 use super::window::{Frame, Stencil, Window, mask_of};
 
 /// Coefficients overlap, and what a model gets wrong it gets wrong along whole edges: a node's count for this many independent
@@ -80,16 +81,19 @@ impl NodeImages {
     /// The densities of all hypotheses and then of all disturbed states under the given light.
     ///
     /// `references` are windows of correct assemblies as [`NodeImages::reference`] cuts them: what they have in common with
-    /// no render is expected of every photo of the station, wherever a hypothesis looks like the good state.
-    pub fn densities(&self, light: &Light, noise: f64, references: &[Grid]) -> Vec<Density> {
+    /// no render is expected of every photo of the station, wherever a hypothesis looks like the good state. Also how unlike
+    /// the rendered good state they are.
+    pub fn densities(&self, light: &Light, noise: f64, references: &[Grid]) -> (Vec<Density>, Vec<Unlikeness>) {
         let mut densities = self.rendered(light, noise);
         let level = |window: &Grid| self.stencil.coefficients(&light.level(window.clone(), &self.surroundings));
-        let gaps: Vec<Vec<f32>> = references.iter().map(|window| densities[0].gap(&level(window))).collect();
+        let levelled: Vec<Vec<f32>> = references.iter().map(level).collect();
+        let unlike = levelled.iter().map(|z| self.stencil.highest_means(&densities[0].surprise(z))).collect();
+        let gaps: Vec<Vec<f32>> = levelled.iter().map(|z| densities[0].gap(z)).collect();
         if !gaps.is_empty() {
             let shares: Vec<Vec<f32>> = densities.iter().map(|d| d.shared(&densities[0])).collect();
             densities.iter_mut().zip(&shares).for_each(|(d, share)| d.adapt(&gaps, share));
         }
-        densities
+        (densities, unlike)
     }
 
     /// The densities as renders alone make them.
@@ -128,7 +132,7 @@ pub struct Evidence {
     /// Best shift under the good state (node px).
     pub shift: [f64; 2],
     /// How far from the first density the node is where it is farthest: mean of [`Density::surprise`] in a square.
-    pub strangeness: f64,
+    pub unlike: Unlikeness,
 }
 
 /// What lies outside a mask; everything where nothing does.
@@ -184,9 +188,9 @@ impl NodeImages {
         let good = expected.map_or_else(|| look.likeliest(0, &free, 1.0), |e| look.likeliest(0, e, weight));
         let others = (1..look.densities.len()).map(|density| look.likeliest(density, &free, 1.0).0);
         let Shifted { shift, ref coefficients } = look.shifted[good.1];
-        let strangeness = self.stencil.highest_mean(&look.densities[0].surprise(coefficients)).unwrap_or(0.0);
+        let unlike = self.stencil.highest_means(&look.densities[0].surprise(coefficients));
         let log_likelihoods = std::iter::once(good.0).chain(others).collect();
-        Evidence { log_likelihoods, inside: look.inside, shift, strangeness }
+        Evidence { log_likelihoods, inside: look.inside, shift, unlike }
     }
 
     /// The shift (node px) at which a density fits best.

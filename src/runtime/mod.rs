@@ -24,4 +24,5 @@ pub mod report;
 pub mod rig;
 pub mod row;
 pub mod settle;
+pub mod strange;
 pub mod window;

@@ -11,7 +11,9 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The format this version writes, and the only one it reads so far.
-pub const FORMAT: u32 = 3;
+pub const FORMAT: u32 = 4;
+/// Sizes of squares in which a node is held against its good state: the cells of its coarsest level and of the one before.
+pub const SCALES: usize = 2;
 /// Larger files are refused before they are parsed (bytes).
 const LARGEST_FILE: usize = 128 << 20;
 /// Caps on counts, far above any real station.
@@ -180,6 +182,9 @@ pub struct Node {
     /// Scores of held-out renders, ascending: log-likelihood ratios per coefficient, less the error mode's threshold.
     pub good_scores: Vec<f64>,
     pub fault_scores: Vec<f64>,
+    /// Mean and standard deviation of the logarithm of how unlike its good state a held-out good render is in the square where it
+    /// is least like it: for the squares of the coarsest level, then for those of the level before.
+    pub usual: Vec<[f64; 2]>,
     /// The first is the good state.
     pub hypotheses: Vec<Hypothesis>,
     /// What the good state looks like beside the faults of other components.
@@ -339,6 +344,8 @@ impl Node {
         ensure(self.plane.is_finite() && steps, "node numbers out of range")?;
         ensure(self.spread.iter().all(|s| s.is_finite() && *s > 0.0), "node spread out of range")?;
         ensure(self.hypotheses.iter().all(|h| !h.threshold.is_nan()), "threshold out of range")?;
+        ensure(matches!(self.usual.len(), 0 | SCALES), "node usual sizes")?;
+        ensure(self.usual.iter().all(|[m, s]| m.is_finite() && s.is_finite() && *s > 0.0), "node usual out of range")?;
         ensure(self.parent.is_none_or(|p| (p as usize) < nodes), "node parent out of range")?;
         ensure(self.disturbs.iter().all(|&d| (d as usize) < nodes), "disturbed node out of range")?;
         ensure(self.mask.len() == height as usize, "mask rows")?;

@@ -129,23 +129,31 @@ impl Stencil {
         self.cells.iter().flat_map(|c| integral.gradient(c.x, c.y, c.half)).collect()
     }
 
-    /// The highest mean of a value per coefficient over the squares of the coarsest level's cells, each with all
-    /// coefficients of any level whose cell has its centre in it. Squares with few coefficients do not count.
-    pub fn highest_mean(&self, values: &[f32]) -> Option<f64> {
+    /// The highest mean of a value per coefficient over the squares of the coarsest levels' cells (the coarsest first), each
+    /// with all coefficients of any level whose cell has its centre in it. Squares with few coefficients do not count.
+    pub fn highest_means<const SCALES: usize>(&self, values: &[f32]) -> [f64; SCALES] {
         const FEWEST: usize = 24;
-        let coarsest = self.levels.last()?;
-        let squares = &self.cells[coarsest.start / 2..coarsest.end / 2];
-        let mean = |s: &Cell| {
-            let inside = |c: &Cell| c.x.abs_diff(s.x) <= s.half && c.y.abs_diff(s.y) <= s.half;
-            let own = self.cells.iter().zip(values.chunks_exact(2)).filter(|(c, _)| inside(c));
-            let (mut sum, mut count) = (0.0, 0usize);
-            for (_, pair) in own {
-                sum += f64::from(pair[0] + pair[1]);
-                count += 2;
+        let mut highest = [0.0f64; SCALES];
+        let width = self.cells.iter().map(|c| c.x).max().unwrap_or(0) + 1;
+        let height = self.cells.iter().map(|c| c.y).max().unwrap_or(0) + 1;
+        let mut sums = Grid::filled(width, height, 0.0);
+        let mut counts = Grid::filled(width, height, 0.0);
+        for (c, pair) in self.cells.iter().zip(values.chunks_exact(2)) {
+            sums.values[c.y * width + c.x] += pair[0] + pair[1];
+            counts.values[c.y * width + c.x] += 2.0;
+        }
+        let (sums, counts) = (Integral::new(&sums), Integral::new(&counts));
+        for (highest, level) in highest.iter_mut().zip(self.levels.iter().rev()) {
+            for s in &self.cells[level.start / 2..level.end / 2] {
+                let (x, y) = (s.x.saturating_sub(s.half), s.y.saturating_sub(s.half));
+                let ends = [(s.x + s.half + 1).min(width), (s.y + s.half + 1).min(height)];
+                let count = counts.between([x, y], ends);
+                if count >= FEWEST as f64 {
+                    *highest = highest.max(sums.between([x, y], ends) / count);
+                }
             }
-            (count >= FEWEST).then(|| sum / count as f64)
-        };
-        squares.iter().filter_map(mean).reduce(f64::max)
+        }
+        highest
     }
 
     /// True for the coefficients whose cell holds a pixel at or above `limit`.

@@ -155,6 +155,7 @@ impl Cutter<'_> {
             mask: runs_of(&plan.mask),
             spread: plan.spread,
             disturbs: plan.disturbs.clone(),
+            usual: Vec::new(),
             good_scores: Vec::new(),
             fault_scores: Vec::new(),
             hypotheses,
@@ -178,7 +179,7 @@ impl Cutter<'_> {
         let context = self.context;
         let images = NodeImages::new(node, context.camera, &context.home, context.powers.len())?;
         let powers = Light::new(context.powers, context.lamps);
-        let densities = images.densities(&powers, ALIGN_NOISE, &[]);
+        let densities = images.densities(&powers, ALIGN_NOISE, &[]).0;
         let factor = (self.plan.frame.factor / context.plan.base) as usize;
         for (sample, density) in samples.iter_mut().zip(&densities) {
             for (shot, shift) in sample.shots.iter().zip(&mut sample.shifts) {

@@ -348,37 +348,53 @@ fn disturb(nodes: &mut [NodePlan], scenes: &[Vec<usize>], changes: &[Option<Mask
     nodes.iter_mut().zip(found).for_each(|(node, disturbed)| node.disturbed = disturbed);
 }
 
-/// Puts every visible mode into the first scene in which no other change comes near, in any camera.
+/// Puts every visible mode into the first scene in which, in any camera, it changes nothing in another's node and no other
+/// changes anything in its own. A node is where any mode of its component shows: a neighbour's fault there would be learnt
+/// as part of this one's.
 fn gather(modes: &[ErrorMode], cameras: &[&[Option<Mask>]]) -> Vec<Vec<usize>> {
-    let mut scenes: Vec<(Vec<usize>, Vec<Option<Mask>>)> = Vec::new();
+    let mut scenes: Vec<Scene> = Vec::new();
     for (m, mode) in modes.iter().enumerate() {
-        let wide: Vec<Option<Mask>> =
-            cameras.iter().map(|changes| changes[m].as_ref().map(|change| dilate(change, 2 * WIDEN))).collect();
-        if wide.iter().all(Option::is_none) {
+        let wide = |change: &Option<Mask>| change.as_ref().map(|mask| dilate(mask, 2 * WIDEN));
+        let changes: Vec<Option<Mask>> = cameras.iter().map(|all| wide(&all[m])).collect();
+        if changes.iter().all(Option::is_none) {
             continue;
         }
-        let fits = |(taken, masks): &(Vec<usize>, Vec<Option<Mask>>)| {
-            let meet = |(mask, wide): (&Option<Mask>, &Option<Mask>)| {
-                mask.iter().zip(wide).any(|(mask, wide)| mask.bits.iter().zip(&wide.bits).any(|(a, b)| *a && *b))
-            };
-            let apart = !masks.iter().zip(&wide).any(meet);
-            apart && taken.iter().all(|&t| modes[t].component != mode.component)
+        let of_component: Vec<usize> = (0..modes.len()).filter(|&o| modes[o].component == mode.component).collect();
+        let area = |all: &&[Option<Mask>]| of_component.iter().filter_map(|&o| all[o].clone()).reduce(united);
+        let areas: Vec<Option<Mask>> = cameras.iter().map(area).collect();
+        let alone = |s: &Scene| s.taken.iter().all(|&t| modes[t].component != mode.component);
+        let fits = |s: &Scene| alone(s) && !any_meet(&s.changes, &areas) && !any_meet(&s.areas, &changes);
+        let unite = |old: &mut Vec<Option<Mask>>, new: Vec<Option<Mask>>| {
+            let pairs = std::mem::take(old).into_iter().zip(new);
+            *old = pairs.map(|(old, new)| old.into_iter().chain(new).reduce(united)).collect();
         };
         match scenes.iter_mut().find(|s| fits(s)) {
-            Some((taken, masks)) => {
-                taken.push(m);
-                for (mask, wide) in masks.iter_mut().zip(wide) {
-                    match (mask.as_mut(), wide) {
-                        (Some(mask), Some(wide)) => {
-                            mask.bits.iter_mut().zip(&wide.bits).for_each(|(a, b)| *a |= b);
-                        }
-                        (None, wide) => *mask = wide,
-                        (Some(_), None) => {}
-                    }
-                }
+            Some(scene) => {
+                scene.taken.push(m);
+                unite(&mut scene.changes, changes);
+                unite(&mut scene.areas, areas);
             }
-            None => scenes.push((vec![m], wide)),
+            None => scenes.push(Scene { taken: vec![m], changes, areas }),
         }
     }
-    scenes.into_iter().map(|(taken, _)| taken).collect()
+    if std::env::var("SCENES").is_ok() {
+        eprintln!("SCENES {} of {}", scenes.len(), modes.len());
+    scenes.into_iter().map(|scene| scene.taken).collect()
+}
+
+/// Modes shown together, with what they change (widened) and the nodes of their components, per camera.
+struct Scene {
+    taken: Vec<usize>,
+    changes: Vec<Option<Mask>>,
+    areas: Vec<Option<Mask>>,
+}
+
+fn any_meet(some: &[Option<Mask>], others: &[Option<Mask>]) -> bool {
+    let pairs = some.iter().zip(others).filter_map(|(a, b)| a.as_ref().zip(b.as_ref()));
+    pairs.into_iter().any(|(a, b)| a.bits.iter().zip(&b.bits).any(|(a, b)| *a && *b))
+}
+
+fn united(mut one: Mask, other: Mask) -> Mask {
+    one.bits.iter_mut().zip(&other.bits).for_each(|(a, b)| *a |= b);
+    one
 }

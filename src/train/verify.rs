@@ -21,6 +21,7 @@ use crate::runtime::light::{range, within};
 use crate::runtime::model::{Lamp, ModeRate, Model, Promise};
 use crate::runtime::photo::Photo;
 use crate::runtime::pose::Installation;
+use crate::runtime::strange::{self, Unlikeness};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -146,6 +147,8 @@ pub fn photo(model: &Model, customer: &Customer, lamps: &[Grid], base: u32, inde
 pub(super) struct Judged {
     /// How well the calibration photo was re-synthesised.
     correlation: f64,
+    /// Per node how unlike its rendered good state it was in the calibration photo.
+    calibrated: Vec<Option<Unlikeness>>,
     pub good: Vec<Verdict>,
     /// Per scene, per draw.
     pub faulty: Vec<Vec<Verdict>>,
@@ -186,6 +189,7 @@ pub fn judge_all(
 pub fn settle(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], held_out: &HeldOut) {
     let HeldOut { judged, unfit, .. } = held_out;
     set_thresholds(model, design, scenes, modes, judged);
+    set_usual(model, judged);
     model.locator.accept = accept(judged, model.locator.unsigned);
     model.station.least_correlation = least_correlation(judged);
     model.promise = promise(model, design, scenes, modes, judged, *unfit);
@@ -205,6 +209,7 @@ pub(super) fn judge(model: &Model, plan: &Plan, customer: &Customer, shots: &Sho
     };
     Some(Judged {
         correlation: calibration.correlation,
+        calibrated: inspector.calibrated().to_vec(),
         good,
         faulty: shots.faulty.iter().enumerate().map(scene).collect(),
     })
@@ -268,6 +273,19 @@ fn set_thresholds(model: &mut Model, design: &Design, scenes: &[Vec<usize>], mod
     }
 }
 
+/// What the nodes of correct assemblies show of what their model does not know.
+fn set_usual(model: &mut Model, judged: &[Judged]) {
+    let mut photos: Vec<(Vec<Unlikeness>, &[Option<Unlikeness>])> = Vec::new();
+    for j in judged {
+        for verdict in j.good.iter().filter(|v| v.nodes.len() == model.nodes.len()) {
+            photos.push((verdict.nodes.iter().map(|n| n.unlike).collect(), &j.calibrated));
+        }
+    }
+    for (node, usual) in model.nodes.iter_mut().zip(strange::usual(&photos)) {
+        node.usual = usual.into_iter().map(|of| of.map(rounded)).collect();
+    }
+}
+
 /// Renders are re-synthesised by what rendered them, photos are not: a photo may fall this far behind. What correlates less
 /// than [`POOREST_FIT`] of a fit that renders reach shows something else.
 fn least_correlation(judged: &[Judged]) -> f64 {
@@ -294,20 +312,27 @@ pub(super) fn promise(
 ) -> Promise {
     // The verdicts were taken before the thresholds were known.
     let faulty = |v: &Verdict, node: usize| inspect::score(&model.nodes[node], &v.nodes[node].against).1 < 0.0;
+    let unknown = |j: &Judged, v: &Verdict| {
+        let mut nodes = v.nodes.clone();
+        strange::weigh(&mut nodes, &model.nodes, &j.calibrated);
+        strange::strangest(&nodes)
+    };
     // Neither does a photo that cannot be judged pass.
-    let unsure = |v: &&Verdict| v.decision == Decision::CannotInspect;
-    let rejected = |v: &&Verdict| unsure(v) || (0..v.nodes.len()).any(|n| faulty(v, n));
-    let goods: Vec<&Verdict> = judged.iter().flat_map(|j| &j.good).collect();
-    let false_rejects = goods.iter().filter(|v| rejected(v)).count() + unfit;
+    let unsure = |v: &Verdict| v.decision == Decision::CannotInspect;
+    let rejected =
+        |(j, v): &(&Judged, &Verdict)| unsure(v) || (0..v.nodes.len()).any(|n| faulty(v, n)) || unknown(j, v).is_some();
+    let goods: Vec<(&Judged, &Verdict)> = judged.iter().flat_map(|j| j.good.iter().map(move |v| (j, v))).collect();
+    let false_rejects = goods.iter().filter(|of| rejected(of)).count() + unfit;
     let mut rates = Vec::new();
     let (mut escapes, mut trials) = (0, 0);
     for (scene, shown) in scenes.iter().enumerate() {
         for &m in shown {
             let component = &design.components[modes[m].component].name;
             let Some(node) = model.nodes.iter().position(|n| &n.name == component) else { continue };
-            let verdicts: Vec<&Verdict> = judged.iter().flat_map(|j| &j.faulty[scene]).collect();
+            let verdicts: Vec<(&Judged, &Verdict)> =
+                judged.iter().flat_map(|j| j.faulty[scene].iter().map(move |v| (j, v))).collect();
             // A photo in which the assembly is not found is not passed: it does not escape.
-            let passed = |v: &&&Verdict| !unsure(v) && !faulty(v, node);
+            let passed = |(j, v): &&(&Judged, &Verdict)| !unsure(v) && !faulty(v, node) && unknown(j, v) != Some(node);
             let escaped = verdicts.iter().filter(passed).count() as u32;
             escapes += escaped;
             trials += verdicts.len() as u32;
