@@ -202,7 +202,11 @@ fn a_clip_on_loose_pegs_can_stand_on_them_or_be_the_wrong_way_round() {
     let modes = fault::modes(&design, &analysis.liaison, &analysis.insertion, &solids);
     let misplaced: Vec<&ErrorMode> = modes.iter().filter(|m| m.kind == FaultKind::Misplaced).collect();
     let names: Vec<&str> = misplaced.iter().map(|m| design.components[m.component].name.as_str()).collect();
-    assert_eq!(names, ["clip", "clip", "label"], "the ring looks alike at any angle");
+    assert_eq!(names, ["clip", "clip", "label", "label", "ring"], "the ring looks alike at any angle");
+    let beside = |m: &&&ErrorMode| matches!(m.motion, Motion::Shift(_));
+    let beside: Vec<&str> =
+        misplaced.iter().filter(beside).map(|m| design.components[m.component].name.as_str()).collect();
+    assert_eq!(beside, ["label", "ring"], "pegs hold the clip");
     let poses = place(&design, &nominal);
     let standing = fault::apply(misplaced[0], [0.9, 0.0, 0.0], &solids, &poses);
     let up = standing.pose.unwrap().translation.z - 10.0;

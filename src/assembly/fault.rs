@@ -5,11 +5,16 @@
 //! where they are, but for loose ones that a misplaced part pushes down, and those that rested on a missing one: they are
 //! as often found lower as where they were, because a thread or a tight fit may hold them.
 
+use super::flip::Flip;
 use super::insertion::Insertion;
 use super::liaison::Liaison;
+use super::loose::loose;
 use super::piece;
 use super::place::place;
+use super::room::Among;
+use super::shift::Shift;
 use super::sink::{Sink, sink};
+use super::tilt::Tilt;
 use super::turn::{Turn, Turning, turns};
 use crate::design::model::{Design, Expr, Values};
 use crate::solid::{Solid, Surface};
@@ -51,6 +56,12 @@ pub enum Motion {
     },
     /// Turned out of its seat, resting on what blocks it, or turned into another seat.
     Turn(Turn),
+    /// On its seat beside its place.
+    Shift(Shift),
+    /// Up at one side.
+    Tilt(Tilt),
+    /// Upside down.
+    Flip(Flip),
     /// The part of another component, with that component's name.
     Replace {
         by: usize,
@@ -67,6 +78,24 @@ pub struct ErrorMode {
     pub motion: Motion,
 }
 
+impl ErrorMode {
+    /// Whether it comes in more than one size.
+    pub fn has_size(&self) -> bool {
+        matches!(self.motion, Motion::Slide { .. } | Motion::Turn(_) | Motion::Shift(_) | Motion::Tilt(_))
+    }
+
+    /// What to hand to [`apply`] to see it at all of `sizes` (0..1), or as far as it goes to every side.
+    pub fn looks(&self, sizes: &[f64]) -> Vec<[f64; 3]> {
+        let sides = match &self.motion {
+            Motion::Shift(shift) => shift.ways.len(),
+            Motion::Tilt(tilt) => tilt.sides.len(),
+            _ => return sizes.iter().map(|u| [*u, 0.5, 0.5]).collect(),
+        };
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        (0..sides).map(|side| [largest, (side as f64 + 0.5) / sides as f64, 0.5]).collect()
+    }
+}
+
 /// A component after a fault of a certain size.
 #[derive(Debug, Clone)]
 pub struct Faulted {
@@ -76,7 +105,7 @@ pub struct Faulted {
     pub solid: Option<Arc<Solid>>,
     /// Loose components pushed down: index and new pose.
     pub pushed: Vec<(usize, Isometry3<f64>)>,
-    /// mm for slides, rad for turns, 0 otherwise.
+    /// mm for slides, shifts and tilts, rad for turns, 0 otherwise.
     pub size: f64,
     /// `raised 1.9 mm`.
     pub text: String,
@@ -86,6 +115,8 @@ pub struct Faulted {
 const SMALLEST: f64 = 0.8;
 /// The largest that is looked for (mm): what stands higher is as easy to see.
 const LARGEST: f64 = 4.0;
+/// A part that fits hold over no more than this (mm) in all may come out of them at one side.
+const BARELY: f64 = 1.5;
 /// The share of cases in which what rested on a missing part stays where it was.
 const STAYS: f64 = 0.5;
 /// A part lifted by less than this (mm) lies where it should.
@@ -104,7 +135,9 @@ pub fn modes(design: &Design, liaison: &Liaison, insertion: &Insertion, solids: 
         let turns = turning.map(|of| turns(&of, SMALLEST)).unwrap_or_default();
         let turns = turns.into_iter().map(|t| (FaultKind::Misplaced, Motion::Turn(t)));
         let remove = sink(component, insertion, liaison, solids, &poses).map_or(Motion::Remove, Motion::RemoveUnder);
-        let motions = [(FaultKind::Missing, remove)].into_iter().chain(slide).chain(turns);
+        let among = Among { component, insertion, solids, poses: &poses };
+        let loose = if is_loose(liaison, insertion, component) { loose(design, &among, SMALLEST) } else { Vec::new() };
+        let motions = [(FaultKind::Missing, remove)].into_iter().chain(slide).chain(turns).chain(loose);
         motions.map(move |(kind, motion)| ErrorMode { component, kind, motion }).collect::<Vec<_>>()
     };
     watched.flat_map(of_one).collect()
@@ -130,7 +163,7 @@ pub fn wrong_parts(design: &Design, liaison: &Liaison, solids: &[Arc<Solid>]) ->
 }
 
 /// The fault at a size: `u` in 0..1 picks it within the mode's range (`u[0]` the size; `u[1]` how far loose components give
-/// way under a misplaced part, and whether what rested on a missing one comes down). `solids` and `poses` hold one entry per component, of the same draw.
+/// way under a misplaced part, whether what rested on a missing one comes down, and to which side a part is off). `solids` and `poses` hold one entry per component, of the same draw.
 pub fn apply(mode: &ErrorMode, u: [f64; 3], solids: &[Arc<Solid>], poses: &[Isometry3<f64>]) -> Faulted {
     let pose = poses[mode.component];
     match &mode.motion {
@@ -152,6 +185,15 @@ pub fn apply(mode: &ErrorMode, u: [f64; 3], solids: &[Arc<Solid>], poses: &[Isom
             let text = if lies { turned } else { format!("{turned} and lifted {:.1} mm", settled.lift) };
             Faulted { size: settled.angle, pushed: settled.pushed, ..still(settled.pose, &text) }
         }
+        Motion::Shift(shift) => {
+            let (moved, size) = shift.moved(u, &pose);
+            Faulted { size, ..still(moved, &format!("shifted {size:.1} mm")) }
+        }
+        Motion::Tilt(tilt) => {
+            let (moved, size) = tilt.moved(u, &pose);
+            Faulted { size, ..still(moved, &format!("tilted, one side {size:.1} mm up")) }
+        }
+        Motion::Flip(flip) => still(flip.moved(&pose), "upside down"),
         Motion::Replace { by, name } => {
             Faulted { solid: Some(solids[*by].clone()), ..still(pose, &format!("in its place the part of {name}")) }
         }
@@ -192,6 +234,13 @@ fn engaged_length(liaison: &Liaison, component: usize, direction: Unit<Vector3<f
         end = end.max(*high);
     }
     (!spans.is_empty()).then_some(total)
+}
+
+/// Whether a component rests on others and no fit holds it sideways.
+fn is_loose(liaison: &Liaison, insertion: &Insertion, component: usize) -> bool {
+    let direction = insertion.direction(component);
+    let held = engaged_length(liaison, component, direction).unwrap_or(0.0);
+    held < BARELY && liaison.rests(component, direction)
 }
 
 /// Components whose part could stand in this one's place: another part, held by the same neighbours in the same way, and

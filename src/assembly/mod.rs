@@ -6,12 +6,15 @@
 pub mod contact;
 pub mod error_tree;
 pub mod fault;
+pub mod flip;
 pub mod insertion;
 pub mod liaison;
 pub mod measure;
 pub mod piece;
 pub mod place;
+pub mod shift;
 pub mod sink;
+pub mod tilt;
 pub mod turn;
 
 mod blocking;
@@ -20,11 +23,13 @@ mod boxes;
 mod check;
 mod columns;
 mod explode;
+mod loose;
 mod matching;
 mod meeting;
 mod overlap;
 mod play;
 mod rest;
+mod room;
 #[cfg(test)]
 pub(crate) mod sample;
 mod sides;

@@ -52,7 +52,7 @@ impl Lie {
 /// What a part is set down on: the tops of all other bodies over the region it may cover.
 pub(crate) struct Bed {
     pub frame: Frame,
-    grid: Grid,
+    pub grid: Grid,
     /// Per cell the top of everything and of what stands firm; -infinity where there is nothing.
     all: Vec<f64>,
     firm: Vec<f64>,
@@ -123,7 +123,7 @@ impl Bed {
 }
 
 /// How deep two intervals of material enter each other at most (mm).
-fn overlap(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
+pub(crate) fn overlap(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
     let pairs = a.iter().flat_map(|p| b.iter().map(move |q| p[1].min(q[1]) - p[0].max(q[0])));
     pairs.fold(0.0, f64::max)
 }
@@ -174,6 +174,16 @@ impl Landing<'_> {
         let differs = |(a, b): (&f64, &f64)| a != b && (a - b).abs() > step;
         let marked: Vec<bool> = self.tops.iter().zip(&other.tops).map(differs).collect();
         erode(&marked, &self.bed.grid).contains(&true)
+    }
+
+    /// Where the part as it was set down is within `gap` mm of what is below it: middles of cells on its underside.
+    pub fn touching(&self, gap: f64) -> Vec<[f64; 3]> {
+        let near = |c: &usize| (self.undersides[*c] - self.bed.all[*c]).abs() < gap;
+        let point = |c: usize| {
+            let [u, v] = self.bed.grid.centre(c);
+            [u, v, self.undersides[c]]
+        };
+        (0..self.undersides.len()).filter(near).map(point).collect()
     }
 
     /// How far each loose body is pushed down by the part at a lie: (component, mm).

@@ -9,9 +9,11 @@ use super::columns::Frame;
 use super::insertion::Insertion;
 use super::liaison::Liaison;
 use super::rest::{Bed, Landing, Lie};
+use super::room::{Among, Room};
 use crate::solid::{Face, Solid, Surface};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use serde::Serialize;
+use std::cell::OnceCell;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -26,6 +28,8 @@ pub struct Turn {
     pub ranges: Vec<[f64; 2]>,
     /// Components that bear it; the others give way.
     pub firm: Vec<usize>,
+    /// Components that hold it down: it lies under them.
+    pub above: Vec<usize>,
     /// At these angles it finds another seat; else it lies on what it meets.
     pub seated: bool,
 }
@@ -54,9 +58,10 @@ const REPEATS: [u32; 6] = [2, 3, 4, 5, 6, 8];
 const IN_SEAT: f64 = 0.1;
 /// A turned part looks different where its surface is higher or lower by more than this (mm).
 const DIFFERENT: f64 = 0.3;
-/// A part without anything that keeps it from turning is tried at multiples of this angle (rad), beyond this many times
-/// the half width of its tolerance.
+/// A part that nothing keeps from turning this far is tried at multiples of this angle (rad), and one that has less room at
+/// those of the smaller angle; beyond this many times the half width of its tolerance.
 const PLAIN: f64 = 5.0 * TAU / 360.0;
+const SLIGHT: f64 = TAU / 360.0;
 const PLAIN_ZONES: f64 = 3.0;
 /// Directions that differ by less than this sine are parallel.
 const PARALLEL: f64 = 1e-3;
@@ -64,6 +69,11 @@ const PARALLEL: f64 = 1e-3;
 const SAME_AXIS: f64 = 0.05;
 /// The axis of a part lies within this share of the part's reach from its middle.
 const CENTRAL: f64 = 0.25;
+/// A part is round about a cylinder of more than this share of its reach, or within this share of the middle of its box.
+const ROUND: f64 = 0.5;
+const CENTRED: f64 = 0.02;
+/// Axes tried of a part that is not round.
+const MOST_AXES: usize = 3;
 
 /// Whose turns are asked for, and among what.
 pub(crate) struct Turning<'a> {
@@ -77,6 +87,17 @@ pub(crate) struct Turning<'a> {
     pub zone: f64,
 }
 
+impl<'a> Turning<'a> {
+    fn among(&self) -> Among<'a> {
+        let Turning { component, insertion, solids, poses, .. } = *self;
+        Among { component, insertion, solids, poses }
+    }
+
+    fn middle(&self) -> Point3<f64> {
+        self.poses[self.component] * box_middle(&self.solids[self.component].mesh.positions)
+    }
+}
+
 /// The turns that lift a component by `least` mm or more, and those at which it finds another seat and looks different.
 /// A part that others hold down is not lifted: its error would show as theirs.
 pub(crate) fn turns(of: &Turning, least: f64) -> Vec<Turn> {
@@ -87,8 +108,12 @@ pub(crate) fn turns(of: &Turning, least: f64) -> Vec<Turn> {
     let lifted = trials.iter().filter(|_| free).find_map(|t| t.turn(t.lifted(least), false));
     // Held down or not: what lies as low as it should and clears what stands above may be turned.
     let unstopped = lifted.is_none();
-    let plain = trials.iter().filter(|_| unstopped).find_map(|t| t.turn(t.plain(), false));
-    let stopped = plain.is_none();
+    let loose = || trials.iter().filter(|_| unstopped);
+    let wide = loose().find_map(|t| t.turn(t.plain(PLAIN, PLAIN, WIDEST), false));
+    let slight = || loose().find_map(|t| t.turn(t.plain(SLIGHT, least / t.reach(), PLAIN), false));
+    let plain = wide.or_else(slight);
+    // What turns freely finds no other seat: it has them all.
+    let stopped = plain.as_ref().is_none_or(|t| t.ranges.iter().flatten().all(|a| a.abs() < WIDEST - SLIGHT));
     let seated = trials.iter().filter(|_| stopped).find_map(|t| t.turn(t.seats(), true));
     lifted.into_iter().chain(plain).chain(seated).collect()
 }
@@ -99,6 +124,7 @@ struct Trial<'a> {
     axis: Axis,
     firm: Vec<usize>,
     bed: Bed,
+    room: OnceCell<Room<'a>>,
 }
 
 impl<'a> Trial<'a> {
@@ -108,12 +134,11 @@ impl<'a> Trial<'a> {
         let below: Vec<usize> =
             (0..of.solids.len()).filter(|c| !of.insertion.above[of.component].contains(c)).collect();
         let bed = axis.bed(of.component, COARSE, &below, &firm, of.solids, of.poses);
-        Trial { of, axis, firm, bed }
+        Trial { of, axis, firm, bed, room: OnceCell::new() }
     }
 
     fn landing(&self, angle: f64) -> Landing<'_> {
-        let pose = self.axis.turn(angle) * self.of.poses[self.of.component];
-        self.bed.set_down(&self.of.solids[self.of.component].mesh, &pose)
+        self.bed.set_down(&self.of.solids[self.of.component].mesh, &self.pose(angle))
     }
 
     /// Lift over its seat (mm); `None` where it would slide off.
@@ -142,28 +167,51 @@ impl<'a> Trial<'a> {
         repeats().into_iter().filter(|a| self.seated(*a)).map(wide).collect()
     }
 
-    /// Any angle well outside the tolerance from which on it looks different, of a part that nothing keeps from turning.
-    fn plain(&self) -> Vec<[f64; 2]> {
-        let side = |sign: f64| {
-            let angles = (1..).map(|k| PLAIN * f64::from(k)).take_while(|a| *a < WIDEST);
-            let from = angles.filter(|a| *a >= PLAIN_ZONES * self.of.zone).find(|a| self.seated(sign * a))?;
-            let ends = [sign * from, sign * WIDEST];
-            self.seated(ends[1]).then_some([ends[0].min(ends[1]), ends[0].max(ends[1])])
-        };
-        [-1.0, 1.0].into_iter().filter_map(side).collect()
+    /// Angles in steps between two of them, and well outside the tolerance, at which it looks different, to either side up to
+    /// where something stops it.
+    fn plain(&self, step: f64, from: f64, to: f64) -> Vec<[f64; 2]> {
+        let from = from.max(PLAIN_ZONES * self.of.zone);
+        [-1.0, 1.0].into_iter().filter_map(|sign| self.plain_side(sign, step, from, to)).collect()
+    }
+
+    /// The first run of angles at which it lies as it should, enters nothing and looks different.
+    fn plain_side(&self, sign: f64, step: f64, from: f64, to: f64) -> Option<[f64; 2]> {
+        let steps = (to / step + 1e-6).floor() as u32;
+        let angles = (1..=steps).map(|k| step * f64::from(k)).filter(|a| *a >= from - 1e-9);
+        let stays = |a: &f64| self.seated(sign * a) && self.room().clears(&self.pose(sign * a));
+        let mut run = angles.skip_while(|a| !stays(a));
+        let first = run.next()?;
+        let last = run.take_while(stays).last().unwrap_or(first);
+        Some([(sign * first).min(sign * last), (sign * first).max(sign * last)])
+    }
+
+    /// The room that the others leave it while it turns.
+    fn room(&self) -> &Room<'a> {
+        let beside = self.axis.offset(&self.of.middle()).norm();
+        self.room.get_or_init(|| Room::new(&self.of.among(), 2.0 * beside))
+    }
+
+    fn pose(&self, angle: f64) -> Isometry3<f64> {
+        self.axis.turn(angle) * self.of.poses[self.of.component]
+    }
+
+    /// How far the component reaches from the axis (mm).
+    fn reach(&self) -> f64 {
+        self.axis.reach(&self.of.solids[self.of.component], &self.of.poses[self.of.component])
     }
 
     /// Whether what stands above the component has its place still.
     fn clears(&self, angle: f64) -> bool {
         let (solids, poses) = (self.of.solids, self.of.poses);
-        let pose = self.axis.turn(angle) * poses[self.of.component];
+        let pose = self.pose(angle);
         let above = self.of.insertion.above[self.of.component].iter();
         above.into_iter().all(|&c| self.bed.clear(&solids[self.of.component].mesh, &pose, &solids[c].mesh, &poses[c]))
     }
 
     fn turn(&self, ranges: Vec<[f64; 2]>, seated: bool) -> Option<Turn> {
         let (point, direction) = (self.axis.point.coords.into(), self.axis.direction.into_inner().into());
-        (!ranges.is_empty()).then(|| Turn { point, direction, ranges, firm: self.firm.clone(), seated })
+        let (firm, above) = (self.firm.clone(), self.of.insertion.above[self.of.component].clone());
+        (!ranges.is_empty()).then_some(Turn { point, direction, ranges, firm, above, seated })
     }
 }
 
@@ -201,8 +249,8 @@ impl Turn {
         if self.seated {
             return still;
         }
-        let all: Vec<usize> = (0..solids.len()).collect();
-        let bed = axis.bed(component, FINE, &all, &self.firm, solids, poses);
+        let below: Vec<usize> = (0..solids.len()).filter(|c| !self.above.contains(c)).collect();
+        let bed = axis.bed(component, FINE, &below, &self.firm, solids, poses);
         let landing = bed.set_down(&solids[component].mesh, &turned);
         let first = landing.lie(false);
         let firm = landing.lie(true).filter(|l| l.height > 0.0);
@@ -225,11 +273,12 @@ struct Axis {
 
 impl Axis {
     /// The axes a component is likely to be turned about, the likeliest first: that of its largest central cylinder along
-    /// the direction; those through the middle of its pegs, of its box and of its vertices.
+    /// the direction; those of its only hole, through the middle of its pegs, of its box and of its vertices.
     fn candidates(solid: &Solid, pose: &Isometry3<f64>, direction: Unit<Vector3<f64>>) -> Vec<Self> {
         let through = |point: Point3<f64>| Axis { point, direction };
         let middle = through(pose * mean(&solid.mesh.positions));
-        let central = CENTRAL * middle.reach(solid, pose);
+        let bounds = through(pose * box_middle(&solid.mesh.positions));
+        let reach = middle.reach(solid, pose);
         let cylinder = |f: &Face| match &solid.surfaces[f.surface] {
             Surface::Cylinder { point, axis, radius } => {
                 let along = (pose.rotation * axis.into_inner()).cross(&direction).norm() < PARALLEL;
@@ -238,19 +287,20 @@ impl Axis {
             _ => None,
         };
         let cylinders: Vec<(Point3<f64>, f64, bool)> = solid.faces.iter().filter_map(cylinder).collect();
-        let about = cylinders.iter().filter(|(p, ..)| middle.offset(p).norm() < central);
-        let largest = about.max_by(|a, b| a.1.total_cmp(&b.1)).map(|c| through(c.0));
+        let about = cylinders.iter().filter(|(p, ..)| middle.offset(p).norm() < CENTRAL * reach);
+        let largest = about.max_by(|a, b| a.1.total_cmp(&b.1)).map(|c| (through(c.0), c.1));
+        // Not the end of a slot in the middle of a bar.
+        let round = largest.is_some_and(|(axis, radius)| {
+            radius > ROUND * reach || axis.offset(&bounds.point).norm() < CENTRED * reach
+        });
+        let holes = distinct(cylinders.iter().filter(|c| !c.2).map(|c| through(c.0)));
+        let hole = holes.first().filter(|_| holes.len() == 1).copied();
         let pegs: Vec<Point3<f64>> = cylinders.iter().filter(|c| c.2).map(|c| c.0).collect();
         let pegs = (pegs.len() > 1).then(|| through(mean(&pegs)));
-        let bounds = through(pose * box_middle(&solid.mesh.positions));
-        let mut axes: Vec<Axis> = Vec::new();
-        for axis in [largest, pegs, Some(bounds), Some(middle)].into_iter().flatten() {
-            if axes.iter().all(|a| a.offset(&axis.point).norm() > SAME_AXIS) {
-                axes.push(axis);
-            }
-        }
-        // A round part has its one axis; of any other the likeliest two are enough.
-        axes.truncate(if largest.is_some() { 1 } else { 2 });
+        let found = [largest.map(|l| l.0), hole, pegs, Some(bounds), Some(middle)];
+        let mut axes = distinct(found.into_iter().flatten());
+        // A round part has its one axis; of any other the likeliest few are enough.
+        axes.truncate(if round { 1 } else { MOST_AXES });
         axes
     }
 
@@ -285,6 +335,17 @@ impl Axis {
         let radius = self.reach(&solids[component], &poses[component]);
         Bed::new(self.direction, [u, v], radius, cell, &others.collect::<Vec<_>>(), solids, poses)
     }
+}
+
+/// Each axis once, in the order given.
+fn distinct(all: impl Iterator<Item = Axis>) -> Vec<Axis> {
+    let mut axes: Vec<Axis> = Vec::new();
+    for axis in all {
+        if axes.iter().all(|a| a.offset(&axis.point).norm() > SAME_AXIS) {
+            axes.push(axis);
+        }
+    }
+    axes
 }
 
 fn mean(points: &[Point3<f64>]) -> Point3<f64> {

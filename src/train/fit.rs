@@ -101,6 +101,7 @@ fn sweep(motion: &Motion, low: f64, high: f64) -> String {
             let at = |share: f64| from + (to - from) * share;
             format!("{:.1} .. {:.1} mm", at(low), at(high))
         }
+        Motion::Tilt(_) => "one side up".into(),
         _ => String::new(),
     }
 }

@@ -176,8 +176,8 @@ impl View<'_> {
             height: self.good.height,
             bits: vec![false; self.good.width * self.good.height],
         };
-        for u in LOOKS {
-            let faulty = seen(self.drawn, &[(mode, [u, 0.5, 0.5])], self.camera);
+        for u in mode.looks(&LOOKS) {
+            let faulty = seen(self.drawn, &[(mode, u)], self.camera);
             let change = change_mask(&self.good, &faulty);
             all.bits.iter_mut().zip(change.bits).for_each(|(a, b)| *a |= b);
         }
@@ -377,8 +377,6 @@ fn gather(modes: &[ErrorMode], cameras: &[&[Option<Mask>]]) -> Vec<Vec<usize>> {
             None => scenes.push(Scene { taken: vec![m], changes, areas }),
         }
     }
-    if std::env::var("SCENES").is_ok() {
-        eprintln!("SCENES {} of {}", scenes.len(), modes.len());
     scenes.into_iter().map(|scene| scene.taken).collect()
 }
 

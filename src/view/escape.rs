@@ -445,7 +445,7 @@ fn variants(task: &Task, stand: Isometry3<f64>, poses: &[Isometry3<f64>]) -> Vec
     order.sort_by_key(|&m| task.modes[m].component);
     for m in order {
         let mode = &task.modes[m];
-        let has_size = matches!(mode.motion, Motion::Slide { .. } | Motion::Turn(_));
+        let has_size = mode.has_size();
         for &u in LOOKS.iter().take(if has_size { LOOKS.len() } else { 1 }) {
             let faulted = fault::apply(mode, [u, 0.5, 0.5], task.solids, poses);
             let mut put = Vec::new();
