@@ -21,7 +21,7 @@ const LIMIT: f64 = 3.5;
 /// is 1.4 standard deviations off).
 const LEAST: f64 = 1.0;
 /// Renders of one node scatter by at least this factor's logarithm: a few dozen do not show all that photos do.
-const LEAST_DEVIATION: f64 = 0.2;
+const LEAST_DEVIATION: f64 = 0.25;
 /// Share of a normal variable below one standard deviation above its mean.
 const ONE_DEVIATION_UP: f64 = 0.84;
 /// What has no logarithm.
@@ -53,7 +53,9 @@ pub fn usual(photos: &[(Vec<Unlikeness>, &[Option<Unlikeness>])]) -> Vec<Vec<[f6
             let mut own: Vec<f64> = beyond.iter().map(|photo| photo[node]).collect();
             own.sort_by(f64::total_cmp);
             let high = own[((own.len() - 1) as f64 * ONE_DEVIATION_UP).round() as usize];
-            usual[node][scale][1] = high.max(LEAST_DEVIATION);
+            // Tails may be heavier than a normal variable's: no photo of these is strange.
+            let highest = own[own.len() - 1] / LIMIT;
+            usual[node][scale][1] = high.max(highest).max(LEAST_DEVIATION);
         }
     }
     usual
@@ -89,9 +91,15 @@ pub fn weigh(nodes: &mut [NodeReport], of: &[Node], calibrated: &[Option<Unliken
         let beyond = beyond(&unlike, &usual, calibrated, scale);
         let known = (0..nodes.len()).filter(|&i| usual[i].len() > scale && unlike[i][scale] >= LEAST);
         for i in known {
-            nodes[i].strangeness = nodes[i].strangeness.max(beyond[i] / usual[i][scale][1]);
+            nodes[i].strangeness = nodes[i].strangeness.max(beyond[i] / (usual[i][scale][1] * of_middle(nodes.len())));
         }
     }
+}
+
+/// What the scatter of the other nodes' median adds to a deviation from it: its variance is π/2 of the mean's.
+fn of_middle(nodes: usize) -> f64 {
+    let others = nodes.saturating_sub(1).max(1) as f64;
+    (1.0 + std::f64::consts::FRAC_PI_2 / others).sqrt()
 }
 
 /// The strangest node, if it is strange.
