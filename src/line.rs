@@ -3,13 +3,14 @@
 
 mod limits;
 
-pub(crate) use limits::{idle_cuts, shapes};
+pub(crate) use limits::idle_cuts;
 
 use crate::artifacts::{self, Artifact, pictures};
 use crate::assembly::Analysis;
 use crate::assembly::error_tree::{ErrorTree, object_tree};
 use crate::assembly::fault::ErrorMode;
 use crate::assembly::liaison::Liaison;
+use crate::assembly::piece::Shelf;
 use crate::assembly::place::place;
 use crate::cache::Cache;
 use crate::design::Loaded;
@@ -24,7 +25,7 @@ use crate::scene::build::{self, Instance, Placed};
 use crate::solid::Solid;
 use crate::train::prove::Proof;
 use crate::train::{Job, Step, shots};
-use crate::view::choose::{self, Choice};
+use crate::view::choose::{self, Asks, Choice};
 use crate::view::escape;
 use crate::view::lock::{self, Lock, Locked};
 use std::collections::{BTreeMap, BTreeSet};
@@ -46,6 +47,8 @@ pub struct Options {
     pub stop: Option<Arc<AtomicBool>>,
     /// Where results are kept for the next time; what is made is the same with and without.
     pub cache: Option<Arc<dyn Cache>>,
+    /// Where solids are kept from one spec to the next that is much like it; what is made is the same with and without.
+    pub shelf: Option<Arc<Shelf>>,
     /// What was chosen before; it stands while what it depended on does.
     pub lock: Option<Lock>,
     /// Choose nothing anew: E0605 where the lock has no answer.
@@ -239,6 +242,17 @@ impl<'a> Line<'a> {
         outcome.map_err(|faults| self.out.diagnostics.extend(faults)).ok()
     }
 
+    /// Every part at its limits.
+    pub fn shapes(&mut self, design: &Design) -> Option<limits::Shapes> {
+        let shelf = self.options.shelf.as_deref();
+        let mut workshop = shelf.map(Shelf::workshop).unwrap_or_default();
+        let shapes = limits::shapes(design, &mut workshop);
+        if let Some(shelf) = shelf {
+            shelf.put_back(workshop);
+        }
+        self.accept(shapes)
+    }
+
     /// The output of a stage that goes on in spite of warnings.
     pub fn check<T>(&mut self, (output, found): (T, Vec<Diagnostic>)) -> Option<T> {
         let stops = found.iter().any(Diagnostic::is_error);
@@ -260,6 +274,12 @@ impl<'a> Line<'a> {
             let before = self.out.lock.take().or_else(|| self.options.lock.clone());
             self.out.lock = Some(before.unwrap_or_default().with(design, entry, locked));
         }
+    }
+
+    /// Whether anybody will read what the camera sees.
+    pub fn asks(&self) -> Asks {
+        let is_read = self.options.keep || self.options.wanted.contains(&Artifact::View);
+        if is_read { Asks::What } else { Asks::Whether }
     }
 
     /// Keeps what a stage made if that is asked for.
@@ -317,7 +337,7 @@ impl<'a> Line<'a> {
 pub(crate) fn choice(shows_all: bool, kept: Option<Placed>, task: &escape::Task) -> Choice {
     match kept {
         Some(placing) if shows_all => escape::keep(task, placing),
-        Some(placing) => choose::keep(task.design, task.station, task.bodies, task.targets, placing),
+        Some(placing) => choose::keep(task.design, task.station, task.bodies, task.targets, placing, task.asks),
         None => escape::choose(task),
     }
 }

@@ -10,17 +10,20 @@ use crate::solid::{Quality, Solid};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Every part at nominal, MMC and LMC. A part that has other faces at its limits than at nominal is an error: it would be
+/// Of every part its solids at nominal, MMC and LMC.
+pub(crate) type Shapes = Vec<[Arc<Solid>; 3]>;
+
+/// Every part at nominal, with triangles, and its boundary at MMC and LMC. A part that has other faces at its limits than at nominal is an error: it would be
 /// another part (E0403).
-pub(crate) fn shapes(design: &Design) -> Result<Vec<[Arc<Solid>; 3]>, Vec<Diagnostic>> {
-    let limits = [design.nominal(), design.mmc(), design.lmc()];
-    let (mut shapes, mut faults, mut workshop) = (Vec::new(), Vec::new(), Workshop::default());
+pub(super) fn shapes(design: &Design, workshop: &mut Workshop) -> Result<Shapes, Vec<Diagnostic>> {
+    let limits @ [nominal, mmc, lmc] = &[design.nominal(), design.mmc(), design.lmc()];
+    let (mut shapes, mut faults) = (Vec::new(), Vec::new());
     let mut compared = BTreeSet::new();
-    let pieces: Vec<_> =
-        design.parts.iter().flat_map(|part| limits.iter().map(move |values| (part, values.as_slice()))).collect();
-    workshop.prepare(&pieces, &Quality::default());
+    let pieces: Vec<_> = design.parts.iter().map(|part| (part, nominal.as_slice())).collect();
+    let bare: Vec<_> = design.parts.iter().flat_map(|part| [(part, mmc.as_slice()), (part, lmc)]).collect();
+    workshop.prepare(&pieces, &bare, &Quality::default());
     for part in &design.parts {
-        match at_limits(part, &limits, &mut workshop) {
+        match at_limits(part, limits, workshop) {
             Ok(solids) => {
                 // Pieces that are alike are compared once.
                 if compared.insert(solids.each_ref().map(Arc::as_ptr)) {
@@ -45,11 +48,12 @@ fn at_limits(
     workshop: &mut Workshop,
 ) -> Result<[Arc<Solid>; 3], Vec<Diagnostic>> {
     let quality = Quality::default();
-    let mut at = |values: &[f64]| workshop.solid(part, values, &quality);
     let limit = |faults: Vec<Diagnostic>, name: &str| -> Vec<Diagnostic> {
         faults.into_iter().map(|fault| fault.note(format!("at {name}, not at nominal"))).collect()
     };
-    Ok([at(nominal)?, at(mmc).map_err(|f| limit(f, "MMC"))?, at(lmc).map_err(|f| limit(f, "LMC"))?])
+    let solid = workshop.solid(part, nominal, &quality)?;
+    let mut at = |values: &[f64], name: &str| workshop.boundary(part, values, &quality).map_err(|f| limit(f, name));
+    Ok([solid, at(mmc, "MMC")?, at(lmc, "LMC")?])
 }
 
 /// W0402: cuts that take nothing away. A cut that leaves no face is tried without, as long as there are few of them.
@@ -82,7 +86,7 @@ fn is_idle(part: &Part, feature: usize, copy: usize, nominal: &[f64], volume: f6
     if without.features[feature].copies.is_empty() {
         without.features.remove(feature);
     }
-    let solid = crate::solid::evaluate(&without, nominal, &Quality::default());
+    let solid = crate::solid::boundary(&without, nominal, &Quality::default());
     solid.is_ok_and(|solid| (solid.volume - volume).abs() <= NOTHING * volume)
 }
 
