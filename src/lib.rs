@@ -151,7 +151,7 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
     line.emit(Artifact::Design, || artifacts::design(&design));
 
     line.enter(Stage::Solid)?;
-    let shapes = line.accept(line::shapes(&design))?;
+    let shapes = line.shapes(&design)?;
     line.check(((), line::idle_cuts(&design, &shapes)));
     let solids = line::per_component(&design, &shapes);
     line.keep(|made| made.solids = solids.clone());
@@ -183,6 +183,7 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
             targets: &targets,
             modes: &if weighs { modes() } else { Vec::new() },
             solids: &solids,
+            asks: line.asks(),
         };
         let choice = line::choice(line.options.keep, kept, &task);
         line.keep(|made| made.chosen(index, &choice));

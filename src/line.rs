@@ -1,16 +1,20 @@
 //! What travels down the line beside the work itself: options, diagnostics, artifacts, progress; and the small joints
 //! between one stage's output and the next one's input.
 
+mod limits;
+
+pub(crate) use limits::idle_cuts;
+
 use crate::artifacts::{self, Artifact, pictures};
 use crate::assembly::Analysis;
 use crate::assembly::error_tree::{ErrorTree, object_tree};
 use crate::assembly::fault::ErrorMode;
 use crate::assembly::liaison::Liaison;
-use crate::assembly::piece::Workshop;
+use crate::assembly::piece::Shelf;
 use crate::assembly::place::place;
 use crate::cache::Cache;
 use crate::design::Loaded;
-use crate::design::model::{Design, Extent, Feature, Op, Part, Shape, Station};
+use crate::design::model::{Design, Station};
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Sources};
 use crate::runtime::camera::Camera;
@@ -18,10 +22,10 @@ use crate::runtime::model::Model;
 use crate::runtime::rig::Rig;
 use crate::scene::Body;
 use crate::scene::build::{self, Instance, Placed};
-use crate::solid::{Quality, Solid};
+use crate::solid::Solid;
 use crate::train::prove::Proof;
 use crate::train::{Job, Step, shots};
-use crate::view::choose::{self, Choice};
+use crate::view::choose::{self, Asks, Choice};
 use crate::view::escape;
 use crate::view::lock::{self, Lock, Locked};
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,6 +47,8 @@ pub struct Options {
     pub stop: Option<Arc<AtomicBool>>,
     /// Where results are kept for the next time; what is made is the same with and without.
     pub cache: Option<Arc<dyn Cache>>,
+    /// Where solids are kept from one spec to the next that is much like it; what is made is the same with and without.
+    pub shelf: Option<Arc<Shelf>>,
     /// What was chosen before; it stands while what it depended on does.
     pub lock: Option<Lock>,
     /// Choose nothing anew: E0605 where the lock has no answer.
@@ -236,6 +242,17 @@ impl<'a> Line<'a> {
         outcome.map_err(|faults| self.out.diagnostics.extend(faults)).ok()
     }
 
+    /// Every part at its limits.
+    pub fn shapes(&mut self, design: &Design) -> Option<limits::Shapes> {
+        let shelf = self.options.shelf.as_deref();
+        let mut workshop = shelf.map(Shelf::workshop).unwrap_or_default();
+        let shapes = limits::shapes(design, &mut workshop);
+        if let Some(shelf) = shelf {
+            shelf.put_back(workshop);
+        }
+        self.accept(shapes)
+    }
+
     /// The output of a stage that goes on in spite of warnings.
     pub fn check<T>(&mut self, (output, found): (T, Vec<Diagnostic>)) -> Option<T> {
         let stops = found.iter().any(Diagnostic::is_error);
@@ -257,6 +274,12 @@ impl<'a> Line<'a> {
             let before = self.out.lock.take().or_else(|| self.options.lock.clone());
             self.out.lock = Some(before.unwrap_or_default().with(design, entry, locked));
         }
+    }
+
+    /// Whether anybody will read what the camera sees.
+    pub fn asks(&self) -> Asks {
+        let is_read = self.options.keep || self.options.wanted.contains(&Artifact::View);
+        if is_read { Asks::What } else { Asks::Whether }
     }
 
     /// Keeps what a stage made if that is asked for.
@@ -314,7 +337,7 @@ impl<'a> Line<'a> {
 pub(crate) fn choice(shows_all: bool, kept: Option<Placed>, task: &escape::Task) -> Choice {
     match kept {
         Some(placing) if shows_all => escape::keep(task, placing),
-        Some(placing) => choose::keep(task.design, task.station, task.bodies, task.targets, placing),
+        Some(placing) => choose::keep(task.design, task.station, task.bodies, task.targets, placing, task.asks),
         None => escape::choose(task),
     }
 }
@@ -354,154 +377,6 @@ fn no_station(design: &Design, name: &str) -> Diagnostic {
         Some(near) => fault.help(format!("did you mean `--station {near}`?")),
         None => fault,
     }
-}
-
-/// Every part at nominal, MMC and LMC. A part that has other faces at its limits than at nominal is an error: it would be
-/// another part (E0403).
-pub(crate) fn shapes(design: &Design) -> Result<Vec<[Arc<Solid>; 3]>, Vec<Diagnostic>> {
-    let limits = [design.nominal(), design.mmc(), design.lmc()];
-    let (mut shapes, mut faults, mut workshop) = (Vec::new(), Vec::new(), Workshop::default());
-    let mut compared = BTreeSet::new();
-    let pieces: Vec<_> =
-        design.parts.iter().flat_map(|part| limits.iter().map(move |values| (part, values.as_slice()))).collect();
-    workshop.prepare(&pieces, &Quality::default());
-    for part in &design.parts {
-        match at_limits(part, &limits, &mut workshop) {
-            Ok(solids) => {
-                // Pieces that are alike are compared once.
-                if compared.insert(solids.each_ref().map(Arc::as_ptr)) {
-                    faults.extend(changed(part, &solids));
-                }
-                shapes.push(solids);
-            }
-            // Pieces of one part have its faults in common.
-            Err(found) => found.into_iter().for_each(|fault| {
-                if !faults.contains(&fault) {
-                    faults.push(fault);
-                }
-            }),
-        }
-    }
-    if faults.is_empty() { Ok(shapes) } else { Err(faults) }
-}
-
-fn at_limits(
-    part: &Part,
-    [nominal, mmc, lmc]: &[Vec<f64>; 3],
-    workshop: &mut Workshop,
-) -> Result<[Arc<Solid>; 3], Vec<Diagnostic>> {
-    let quality = Quality::default();
-    let mut at = |values: &[f64]| workshop.solid(part, values, &quality);
-    let limit = |faults: Vec<Diagnostic>, name: &str| -> Vec<Diagnostic> {
-        faults.into_iter().map(|fault| fault.note(format!("at {name}, not at nominal"))).collect()
-    };
-    Ok([at(nominal)?, at(mmc).map_err(|f| limit(f, "MMC"))?, at(lmc).map_err(|f| limit(f, "LMC"))?])
-}
-
-/// W0402: cuts that take nothing away. A cut that leaves no face is tried without, as long as there are few of them.
-pub(crate) fn idle_cuts(design: &Design, shapes: &[[Arc<Solid>; 3]]) -> Vec<Diagnostic> {
-    /// Parts that are made once more, at most.
-    const TRIALS: usize = 20;
-    let (nominal, mut trials) = (design.nominal(), 0);
-    let (mut seen, mut found) = (BTreeSet::new(), Vec::new());
-    for (part, [solid, ..]) in design.parts.iter().zip(shapes).filter(|(part, _)| seen.insert(&part.name)) {
-        let shown: BTreeSet<&str> = solid.faces.iter().filter_map(|f| f.name.split('.').next()).collect();
-        for (i, feature) in part.features.iter().enumerate().filter(|(_, f)| f.op == Op::Cut) {
-            let mut idle = |copy: &usize| {
-                let suspect = !shown.contains(copy_name(feature, *copy).as_str()) && trials < TRIALS;
-                trials += usize::from(suspect);
-                suspect && is_idle(part, i, *copy, &nominal, solid.volume)
-            };
-            let copies: Vec<usize> = (0..feature.copies.len()).filter(|copy| idle(copy)).collect();
-            found.extend(takes_nothing(part, feature, &copies, &nominal, solid));
-        }
-    }
-    found
-}
-
-/// Whether a part is the same without one copy of a cut.
-fn is_idle(part: &Part, feature: usize, copy: usize, nominal: &[f64], volume: f64) -> bool {
-    /// Of the volume: below it is rounding.
-    const NOTHING: f64 = 1e-9;
-    let mut without = part.clone();
-    without.features[feature].copies.remove(copy);
-    if without.features[feature].copies.is_empty() {
-        without.features.remove(feature);
-    }
-    let solid = crate::solid::evaluate(&without, nominal, &Quality::default());
-    solid.is_ok_and(|solid| (solid.volume - volume).abs() <= NOTHING * volume)
-}
-
-fn copy_name(feature: &Feature, copy: usize) -> String {
-    if feature.patterned { format!("{}[{}]", feature.name, copy + 1) } else { feature.name.clone() }
-}
-
-fn takes_nothing(
-    part: &Part,
-    feature: &Feature,
-    copies: &[usize],
-    nominal: &[f64],
-    solid: &Solid,
-) -> Option<Diagnostic> {
-    let (&copy, others) = copies.split_first()?;
-    let first = copy_name(feature, copy);
-    let message = match others.len() {
-        0 => format!("`{first}` takes nothing from `{}`", part.name),
-        n => format!("`{first}` and {n} more of `{}` take nothing from `{}`", feature.name, part.name),
-    };
-    let off = off_by(part, feature, copy, nominal, solid).unwrap_or_default();
-    let warning = Diagnostic::warning("W0402", feature.span, message);
-    Some(warning.label(format!("meets no material at nominal{off}")).help("check where it stands, or remove it"))
-}
-
-/// `: it stands 3.00 mm from `slab.top``, of a cut that is a body by itself.
-fn off_by(part: &Part, feature: &Feature, copy: usize, nominal: &[f64], solid: &Solid) -> Option<String> {
-    /// Of what is nearer it is said that it touches (mm).
-    const TOUCHING: f64 = 0.005;
-    fn is_endless(shape: &Shape) -> bool {
-        match shape {
-            Shape::Box { z: h, .. } | Shape::Cylinder { h, .. } | Shape::Cone { h, .. } | Shape::Prism { h, .. } => {
-                matches!(h, Extent::Through)
-            }
-            Shape::Group { features } => {
-                features.iter().flat_map(|feature| &feature.copies).any(|copy| is_endless(&copy.shape))
-            }
-            Shape::Sphere { .. } | Shape::Torus { .. } | Shape::Revolve { .. } => false,
-        }
-    }
-    let copy = feature.copies[copy].clone();
-    if is_endless(&copy.shape) {
-        return None;
-    }
-    let alone = Feature { op: Op::Add, patterned: false, copies: vec![copy], ..feature.clone() };
-    let alone = Part { features: vec![alone], ..part.clone() };
-    let tool = crate::solid::evaluate(&alone, nominal, &Quality::default()).ok()?;
-    let (distance, face) = crate::assembly::apart(&tool, solid)?;
-    let near = face.unwrap_or(&part.name);
-    Some(match distance < TOUCHING {
-        true => format!(": it only touches `{near}`"),
-        false => format!(": it stands {distance:.2} mm from `{near}`"),
-    })
-}
-
-/// E0403: which face comes or goes within tolerance.
-fn changed(part: &Part, [nominal, mmc, lmc]: &[Arc<Solid>; 3]) -> Option<Diagnostic> {
-    let names = |solid: &Solid| -> BTreeSet<String> { solid.faces.iter().map(|f| f.name.clone()).collect() };
-    let own = names(nominal);
-    let at = |limit: &str, solid: &Solid| -> Option<String> {
-        let there = names(solid);
-        let gone = own.difference(&there).next().map(|f| format!("at {limit} the face `{f}` is gone"));
-        let came =
-            there.difference(&own).next().map(|f| format!("at {limit} there is a face `{f}` that nominal has not"));
-        let count = (nominal.faces.len(), solid.faces.len());
-        let more = (count.0 != count.1).then(|| format!("nominal has {} faces, {limit} has {}", count.0, count.1));
-        gone.or(came).or(more)
-    };
-    let what = at("MMC", mmc).or_else(|| at("LMC", lmc))?;
-    let message = format!("`{}` changes its shape within tolerance: {what}", part.name);
-    Some(Diagnostic::error("E0403", part.span, message).label("not one shape but several").note(
-        "an inspector is trained on one shape; keep walls and steps wider than their tolerances, or tighten these",
-    ))
 }
 
 /// One solid per component at nominal.

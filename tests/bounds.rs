@@ -140,3 +140,30 @@ fn infinite_and_missing_numbers_are_refused_everywhere() {
         }
     }
 }
+
+/// Text that opens far more than any stack could follow, closed or not.
+#[test]
+fn brackets_may_be_nested_a_hundred_thousand_deep() {
+    const DEEP: usize = 100_000;
+    for (before, opens, closes) in [
+        ("let a = ", "(", ")"),
+        ("let a = ", "(-", ")"),
+        ("let a = ", "{ mmc ", " }"),
+        ("part p {\nadd f = ", "box(x = ", ")"),
+        ("", "part p {\n", "}\n"),
+    ] {
+        for depth in [0, DEEP] {
+            let text = format!("gonogo 1\n{before}{}1{}\n", opens.repeat(DEEP), closes.repeat(depth));
+            assert!(!codes(&text).is_empty() && gonogo::syntax::format(&text).is_err(), "{opens}");
+        }
+    }
+}
+
+#[test]
+fn groups_may_be_nested_ten_thousand_deep() {
+    const DEEP: usize = 10_000;
+    for head in ["add g = group {\n", "cut g = 2x group on line(pitch = 1) {\n"] {
+        let part = format!("{}add a = sphere(d = 1)\n{}", head.repeat(DEEP), "}\n".repeat(DEEP));
+        assert_eq!(codes(&spec(&part, "")), ["E0101"]);
+    }
+}

@@ -1,4 +1,5 @@
-//! Thousands of damaged models, calibrations, photos and specs: an error each, never a panic, and no flood of memory.
+//! Thousands of damaged models, calibrations, photos, specs, foreign designs and messages of editors: an error each, never a
+//! panic, and no flood of memory.
 //!
 //! The damage is drawn from a seed, so every run is the same. `GONOGO_FUZZ_SECONDS=600 cargo test --release --test fuzz` goes on
 //! with further seeds; what breaks is kept in `target/tmp/fuzz`. `fuzz/` has the same targets for libFuzzer.
@@ -321,4 +322,125 @@ fn specs_up_to_the_view() {
         let spec = draw.one(&specs[..2]);
         text_damaged(spec, &specs, draw).into_bytes()
     });
+}
+
+#[cfg(feature = "compile")]
+#[test]
+fn designs_of_openscad() {
+    let designs = [PLATE, KNOB];
+    designs.iter().for_each(|design| targets::import(design.as_bytes()));
+    seeds("import", &designs.map(str::as_bytes));
+    fuzz("import", 1_500, targets::import, |draw| {
+        let design = draw.one(&designs);
+        text_damaged(design, &designs, draw).into_bytes()
+    });
+}
+
+/// As OpenSCAD 2021.01 writes them: a plate with a ring of holes, and a knob turned about its axis.
+#[cfg(feature = "compile")]
+const PLATE: &str = r"difference() {
+	union() {
+		cube(size = [40, 20, 5], center = true);
+		multmatrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 2.5], [0, 0, 0, 1]]) {
+			cylinder($fn = 48, $fa = 12, $fs = 2, h = 10, r1 = 6, r2 = 5, center = false);
+		}
+		multmatrix([[0.866025, -0.5, 0, 10], [0.5, 0.866025, 0, 3], [0, 0, 1, 0], [0, 0, 0, 1]]) {
+			linear_extrude(height = 3, center = false, convexity = 1, scale = [1, 1], $fn = 0, $fa = 12, $fs = 2) {
+				polygon(points = [[0, 0], [5, 0], [5, 4], [1, 1]], paths = [[0, 1, 2, 3]], convexity = 1);
+			}
+		}
+	}
+	group() {
+		multmatrix([[1, 0, 0, -15], [0, 1, 0, -6], [0, 0, 1, -5], [0, 0, 0, 1]]) {
+			cylinder($fn = 48, $fa = 12, $fs = 2, h = 20, r1 = 1.5, r2 = 1.5, center = false);
+		}
+		multmatrix([[1, 0, 0, 15], [0, 1, 0, -6], [0, 0, 1, -5], [0, 0, 0, 1]]) {
+			cylinder($fn = 6, $fa = 12, $fs = 2, h = 20, r1 = 1.5, r2 = 1.5, center = false);
+		}
+	}
+	hull() {
+		multmatrix([[1, 0, 0, -5], [0, 1, 0, 5], [0, 0, 1, -5], [0, 0, 0, 1]]) {
+			cylinder($fn = 48, $fa = 12, $fs = 2, h = 20, r1 = 1, r2 = 1, center = false);
+		}
+		multmatrix([[1, 0, 0, 5], [0, 1, 0, 5], [0, 0, 1, -5], [0, 0, 0, 1]]) {
+			cylinder($fn = 48, $fa = 12, $fs = 2, h = 20, r1 = 1, r2 = 1, center = false);
+		}
+	}
+}
+";
+#[cfg(feature = "compile")]
+const KNOB: &str = r"union() {
+	rotate_extrude(angle = 360, convexity = 2, $fn = 64, $fa = 12, $fs = 2) {
+		polygon(points = [[0, 0], [9, 0], [9, 4], [6, 7], [0, 7]], paths = undef, convexity = 1);
+	}
+	intersection() {
+		multmatrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 7], [0, 0, 0, 1]]) {
+			sphere($fn = 64, $fa = 12, $fs = 2, r = 5);
+		}
+		%cube(size = 3, center = false);
+		multmatrix([[1, 0, 0, -8], [0, 1, 0, -8], [0, 0, 1, 6], [0, 0, 0, 1]]) {
+			cube(size = [16, 16, 8], center = false);
+		}
+	}
+	linear_extrude(height = 2, center = true, convexity = 1, $fn = 0, $fa = 12, $fs = 2) {
+		offset(r = 1, $fn = 0, $fa = 12, $fs = 2) {
+			square(size = [20, 6], center = true);
+		}
+	}
+}
+";
+
+#[cfg(feature = "cli")]
+#[test]
+fn messages_of_editors() {
+    let session = session(&specs()[0]);
+    targets::messages(session.as_bytes());
+    seeds("messages", &[session.as_bytes()]);
+    fuzz("messages", 60, targets::messages, |draw| text_damaged(&session, &[&session], draw).into_bytes());
+}
+
+/// What an editor sends: a text is opened, everything is asked about it, it is changed and asked about again, and closed.
+#[cfg(feature = "cli")]
+fn session(spec: &str) -> String {
+    use serde_json::json;
+    const QUESTIONS: [&str; 13] = [
+        "hover",
+        "completion",
+        "signatureHelp",
+        "definition",
+        "references",
+        "documentHighlight",
+        "documentSymbol",
+        "codeAction",
+        "formatting",
+        "prepareRename",
+        "rename",
+        "inlayHint",
+        "semanticTokens/full",
+    ];
+    let document = json!({ "uri": "file:///w/a.gng", "version": 1 });
+    let mut opened = document.clone();
+    (opened["languageId"], opened["text"]) = (json!("gonogo"), json!(spec));
+    let place = |line: u32, character: u32| json!({ "line": line, "character": character });
+    let mut lines = vec![json!(["textDocument/didOpen", { "textDocument": opened }])];
+    for round in 0..2 {
+        for question in QUESTIONS {
+            let at = place(17 + 9 * round, 11);
+            let params = json!({
+                "textDocument": document, "position": at, "newName": "other",
+                "options": { "tabSize": 4, "insertSpaces": true },
+                "context": { "includeDeclaration": true, "diagnostics": [], "triggerKind": 1, "isRetrigger": false },
+                "range": { "start": at, "end": place(40, 0) },
+            });
+            lines.push(json!([format!("textDocument/{question}"), params]));
+        }
+        let range = json!({ "start": place(12, 4), "end": place(14, 6) });
+        let changes = json!([{ "range": range, "text": "part p {\n add b = 3x cylinder(" }]);
+        lines.push(json!(["textDocument/didChange", { "textDocument": document, "contentChanges": changes }]));
+    }
+    lines.push(json!(["workspace/executeCommand", { "command": "gonogo.explain", "arguments": ["E0305"] }]));
+    lines.push(json!(["workspace/symbol", { "query": "pin" }]));
+    lines.push(json!(["textDocument/didSave", { "textDocument": document }]));
+    lines.push(json!(["textDocument/didClose", { "textDocument": document }]));
+    lines.iter().map(|line| format!("{line}\n")).collect()
 }

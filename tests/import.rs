@@ -65,6 +65,32 @@ fn disc(d: f64, h: f64) -> f64 {
 }
 
 #[test]
+fn corners_that_are_only_printed_differently_are_one() {
+    let hexagon = |h: f64| format!("cylinder($fn = 6, $fa = 12, $fs = 2, h = {h}, r1 = 1, r2 = 1, center = false);");
+    let prism = |h: f64, points: &str| {
+        format!("linear_extrude(height = {h}) {{\npolygon(points = [{points}], paths = undef);\n}}\n")
+    };
+    let (half, deep) = (0.75 * 3f64.sqrt(), 3f64.sqrt() / 2.0);
+    // One in the other: 4e-7 mm lie between their sides.
+    let six = "[1, 0], [0.5, 0.866025], [-0.5, 0.866025], [-1, 0], [-0.5, -0.866025], [0.5, -0.866025]";
+    same_volume(&format!("union() {{\n{}\n{}}}", hexagon(3.0), prism(5.0, six)), 2.0 * half * 5.0);
+    // Side by side in part.
+    let house = "[1, 0], [0.5, 0.866025], [0.5, 2], [-0.5, 2], [-0.5, 0.866025], [-1, 0]";
+    let csg = format!("union() {{\n{}{}}}", moved([0.0, 0.0, 2.0], &hexagon(3.0)), prism(5.0, house));
+    same_volume(&csg, 5.0 * (half + 2.0 - deep) + 3.0 * half);
+    // Through a corner; and larger, where six digits are coarser.
+    for (r, corner) in [(2.0, "1.41421"), (20.0, "14.1421"), (200.0, "141.421")] {
+        let octagon = format!("cylinder($fn = 8, $fa = 12, $fs = 2, h = 5, r1 = {r}, r2 = {r}, center = false);");
+        let kite = prism(8.0, &format!("[{corner}, {corner}], [{r}, 0], [0, 0], [0, {r}]"));
+        same_volume(&format!("difference() {{\n{octagon}\n{kite}}}"), 1.5 * 2f64.sqrt() * r * r * 5.0);
+    }
+    // Heights.
+    let slab = moved([0.0, 0.0, 0.866_025_4], "cube(size = [9, 9, 1.73205], center = false);");
+    let csg = format!("union() {{\ncube(size = [4, 4, 0.866025], center = false);\n{slab}}}");
+    same_volume(&csg, 16.0 * deep + 81.0 * 2.0 * deep);
+}
+
+#[test]
 fn a_plate_with_holes_reads_as_a_drawing() {
     let holes: String = [[-15.0, -6.0], [-15.0, 6.0], [15.0, -6.0], [15.0, 6.0]]
         .map(|[x, y]| moved([x, y, -5.0], &cylinder(3.0, 20.0)))
@@ -278,4 +304,16 @@ fn wedge() -> f64 {
     }
     let cross = |k: usize| area[k][0] * area[(k + 1) % area.len()][1] - area[k][1] * area[(k + 1) % area.len()][0];
     (0..area.len()).map(cross).sum::<f64>() / 2.0
+}
+
+#[test]
+fn what_reaches_to_the_stars_is_refused() {
+    let far = moved([0.0, 0.0, 1e300], "cube(size = [1, 1, 1], center = true);");
+    let wide = "linear_extrude(height = 1) {\npolygon(points = [[0, 0], [5, 0], [5, 1e308]], paths = undef);\n}\n";
+    let large = "sphere($fn = 99, $fa = 12, $fs = 2, r = 3e200);";
+    for (csg, node) in [(far.as_str(), "cube"), (wide, "polygon"), (large, "sphere")] {
+        let found = faults(csg);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].0 == "E0902" && found[0].2.contains(&format!("`{node}`")), "{found:?}");
+    }
 }

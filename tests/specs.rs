@@ -207,3 +207,22 @@ fn what_is_emitted_of_a_design_names_its_measures() {
     );
     assert!(!gonogo::artifacts::design(&design("pinned_plate")).contains("measures"));
 }
+
+#[test]
+fn parts_kept_from_an_earlier_text_change_nothing() {
+    use gonogo::artifacts::Artifact;
+    use gonogo::{Options, compile};
+    let text = read("tests/data/two_pins.gng").unwrap();
+    let shelf = std::sync::Arc::default();
+    // As it is typed: a size, then the same again, then one that is wrong, then the first.
+    for (from, to) in [("", ""), ("40 ±0.1", "41 ±0.1"), ("40 ±0.1", "41 ±0.1"), ("6 +0.012/0", "600"), ("", "")] {
+        let text = text.replacen(from, to, 1);
+        let made = |shelf| {
+            let wanted = [Artifact::Brep, Artifact::Contacts].into();
+            let options = Options { wanted, shelf, ..Options::default() };
+            let compiled = compile("x.gng", &|_| Ok(text.clone()), &options, &|_| {});
+            (compiled.diagnostics, compiled.artifacts)
+        };
+        assert_eq!(made(Some(std::sync::Arc::clone(&shelf))), made(None), "{to}");
+    }
+}

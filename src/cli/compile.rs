@@ -103,7 +103,6 @@ fn check_once(
         let options = Options {
             station: None,
             set: args.variant.set.clone(),
-            wanted: BTreeSet::from([Artifact::View]),
             lock: keep::read_lock(path)?,
             ..Options::default()
         };

@@ -5,7 +5,7 @@
 
 use super::Exit;
 use super::output::{self, Failure};
-use crate::artifacts::Artifact;
+use crate::assembly::piece::Shelf;
 use crate::diag::{Diagnostic, Sources};
 use crate::lsp::{Fault, Job, Notice, Server, name};
 use crate::{Compiled, Options};
@@ -189,8 +189,9 @@ impl Checker {
     fn start(events: Sender<Event>) -> Checker {
         let (jobs, inbox) = channel::<(Job, Arc<AtomicBool>)>();
         thread::spawn(move || {
+            let shelf = Arc::default();
             for (job, stop) in inbox {
-                let result = check(&job, &stop);
+                let result = check(&job, &stop, &shelf);
                 if events.send(Event::Found(Box::new(Found { job, result }))).is_err() {
                     return;
                 }
@@ -212,12 +213,13 @@ impl Checker {
     }
 }
 
-/// The slow stages; nothing if they were stopped or failed.
-fn check(job: &Job, stop: &Arc<AtomicBool>) -> Option<(Vec<Diagnostic>, Sources)> {
+/// The slow stages; nothing if they were stopped or failed. Parts that have not changed since the last time are not made again.
+fn check(job: &Job, stop: &Arc<AtomicBool>, shelf: &Arc<Shelf>) -> Option<(Vec<Diagnostic>, Sources)> {
     if stop.load(Ordering::Relaxed) {
         return None;
     }
-    let options = Options { wanted: BTreeSet::from([Artifact::View]), stop: Some(stop.clone()), ..Options::default() };
+    let (stop_too, shelf) = (Some(stop.clone()), Some(shelf.clone()));
+    let options = Options { stop: stop_too, shelf, ..Options::default() };
     let text_of = |name: &str| job.texts.get(name).map_or_else(|| read(name), |text| Ok(text.clone()));
     // Whatever goes wrong in there, the editor keeps its server.
     let compiled = catch_unwind(AssertUnwindSafe(|| crate::compile(&job.root, &text_of, &options, &|_| {})));

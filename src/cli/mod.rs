@@ -11,7 +11,6 @@ mod fix;
 mod font;
 mod format;
 mod golden;
-mod golden_json;
 mod import;
 mod judge;
 mod keep;

@@ -23,6 +23,7 @@ mod pattern;
 mod per_photo;
 mod primitive;
 mod profile;
+mod resolve;
 mod scope;
 mod seat;
 mod sense;

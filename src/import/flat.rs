@@ -221,7 +221,7 @@ pub fn scaled(outline: &Outline, parts: &Parts) -> Option<Outline> {
 }
 
 /// Without corners that are none: doubles, and points on a straight side.
-fn tidied(mut corners: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+pub fn tidied(mut corners: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     loop {
         let n = corners.len();
         let needless = (0..n).find(|&i| {

@@ -13,6 +13,8 @@ use crate::diag::{Diagnostic, Span};
 
 /// With this many facets or fewer, asked for by `$fn`, a round shape is meant as a prism: a hexagon, an octagon.
 pub const FACETED: f64 = 12.0;
+/// Nothing reaches farther from the origin than this (mm): of six digits none is left for a millimetre there.
+const LARGEST: f64 = 1e7;
 /// More nodes than this without a counterpart need not be listed.
 const MAX_FAULTS: usize = 50;
 /// Least and greatest coordinates.
@@ -79,6 +81,17 @@ fn apart(bodies: Vec<Vec<Step>>) -> Vec<Vec<Vec<Step>>> {
     found.into_iter().map(|(_, bodies)| bodies).collect()
 }
 
+/// Whether a feature reaches farther than numbers can be told apart, or nowhere.
+fn is_immense(step: &Step) -> bool {
+    match &step.item {
+        // Refused already where it was made.
+        Item::Group(_) => false,
+        Item::Solid { shape, place } => {
+            !shape.extent().map(|corner| place.point(corner)).iter().flatten().all(|v| v.abs() <= LARGEST)
+        }
+    }
+}
+
 fn meet(a: &Extent, b: &Extent) -> bool {
     (0..3).all(|k| a[0][k] <= b[1][k] + TOUCH && b[0][k] <= a[1][k] + TOUCH)
 }
@@ -118,6 +131,11 @@ impl Lower {
     }
 
     fn node(&mut self, node: &Node, frame: &Frame) -> Vec<Step> {
+        let steps = self.lowered(node, frame);
+        if steps.iter().any(is_immense) { self.refuse(node, "larger than anything that is made") } else { steps }
+    }
+
+    fn lowered(&mut self, node: &Node, frame: &Frame) -> Vec<Step> {
         let flat = !matches!(frame.drawing, Drawing::None);
         match node.name.as_str() {
             "group" | "union" | "color" | "render" => self.union(&node.children, frame),

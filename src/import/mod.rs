@@ -12,6 +12,7 @@ mod flush;
 mod lower;
 mod pattern;
 mod placement;
+mod snap;
 mod write;
 
 use crate::diag::Diagnostic;
@@ -21,6 +22,6 @@ use crate::diag::Diagnostic;
 pub fn openscad(text: &str, file: &str, name: &str) -> Result<String, Vec<Diagnostic>> {
     let nodes = csg::parse(text)?;
     let parts = lower::parts(&nodes)?;
-    let parts: Vec<_> = parts.into_iter().map(|steps| flush::marked(pattern::folded(steps))).collect();
+    let parts: Vec<_> = parts.into_iter().map(|steps| flush::marked(pattern::folded(snap::snapped(steps)))).collect();
     write::parts(&parts, file, name)
 }

@@ -51,20 +51,35 @@ pub fn evaluate(part: &Part, values: &Values, quality: &Quality) -> Result<Solid
     closed(&mut tree, &arrangement, quality)
 }
 
-/// Faces and triangles, with finer chords where those asked for are too coarse.
+/// The same without triangles: for limits, of which only faces and figures are asked.
+pub fn boundary(part: &Part, values: &Values, quality: &Quality) -> Result<Solid, Vec<Diagnostic>> {
+    let mut tree = csg::Tree::build(part, values)?;
+    let arrangement = arrange::arrange(&tree)?;
+    fine_enough(quality, |quality| brep::build(&mut tree, arrangement.clone(), quality))
+}
+
+/// Faces and triangles.
 fn closed(
     tree: &mut csg::Tree,
     arrangement: &arrange::Arrangement,
     quality: &Quality,
 ) -> Result<Solid, Vec<Diagnostic>> {
-    let mut outcome = close(tree, arrangement, quality);
+    fine_enough(quality, |quality| close(tree, arrangement, quality))
+}
+
+/// A solid with finer chords where those asked for are too coarse.
+fn fine_enough(
+    quality: &Quality,
+    mut close: impl FnMut(&Quality) -> Result<Solid, brep::Failure>,
+) -> Result<Solid, Vec<Diagnostic>> {
+    let mut outcome = close(quality);
     // Chords of curves that come near each other may cross where the curves do not: shorter ones do not.
     for (chord, angle) in FINER {
         if !matches!(outcome, Err(brep::Failure::Coarse(_))) {
             break;
         }
         let finer = Quality { chord: quality.chord * chord, angle: quality.angle * angle };
-        outcome = close(tree, arrangement, &finer).or(outcome);
+        outcome = close(&finer).or(outcome);
     }
     outcome.map_err(|failure| match failure {
         brep::Failure::Certain(faults) | brep::Failure::Coarse(faults) => faults,

@@ -33,6 +33,17 @@ const SEARCH_WIDTH: u32 = 160;
 const COARSE: [u32; 3] = [3, 7, 12];
 /// Rounds of refinement, each with half the step of the one before.
 const ROUNDS: u32 = 3;
+/// A component of which the search sees this many pixels is seen: at full size they cannot be fewer than [`LEAST_PIXELS`].
+const NO_DOUBT: u32 = 8 * LEAST_PIXELS;
+
+/// What is wanted of a choice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asks {
+    /// Whether the camera will do: it is looked through at full size only where the search leaves a doubt.
+    Whether,
+    /// And what it sees of every component.
+    What,
+}
 
 /// A face whose visible pixels count.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +77,7 @@ pub struct Choice {
     pub table: Vec<Scored>,
     /// The nominal camera of the chosen view.
     pub camera: Camera,
-    /// What it sees, at full size.
+    /// What it sees, at full size; empty where nobody [`Asks`] and nothing is in doubt.
     pub seen: Vec<Seen>,
     /// E0601 for every watched component it does not see, E0603 for what stands inside of something.
     pub diagnostics: Vec<Diagnostic>,
@@ -110,7 +121,7 @@ pub fn targets(levels: &BTreeMap<FaceRef, u32>) -> Vec<Target> {
 pub fn choose(design: &Design, station: &Station, bodies: &[Body], targets: &[Target]) -> Choice {
     let table = paper_table(design, station, bodies, targets);
     let best = first(&table);
-    chosen(design, station, bodies, table, best)
+    chosen(design, station, bodies, (table, best), Asks::What)
 }
 
 /// The scores of all views that are tried.
@@ -125,16 +136,29 @@ pub(super) fn paper_table(design: &Design, station: &Station, bodies: &[Body], t
 }
 
 /// A choice made before: the view is scored and checked like a fixed one, and no other is tried.
-pub fn keep(design: &Design, station: &Station, bodies: &[Body], targets: &[Target], placing: Placed) -> Choice {
+pub fn keep(
+    design: &Design,
+    station: &Station,
+    bodies: &[Body],
+    targets: &[Target],
+    placing: Placed,
+    asks: Asks,
+) -> Choice {
     let search = Search::new(design, station, bodies, targets);
-    chosen(design, station, bodies, search.score_all(&[placing]), 0)
+    chosen(design, station, bodies, (search.score_all(&[placing]), 0), asks)
 }
 
 /// The view `best` of the table as the choice.
-pub(super) fn chosen(design: &Design, station: &Station, bodies: &[Body], table: Vec<Scored>, best: usize) -> Choice {
+pub(super) fn chosen(
+    design: &Design,
+    station: &Station,
+    bodies: &[Body],
+    (table, best): (Vec<Scored>, usize),
+    asks: Asks,
+) -> Choice {
     let camera = build::camera(&station.camera, table[best].placing);
-    let grid = PixelGrid::of(&camera);
-    let seen = seen_on_grid(bodies, &camera, &grid);
+    let is_sure = asks == Asks::Whether && table[best].watched.iter().all(|&pixels| pixels >= NO_DOUBT);
+    let seen = if is_sure { Vec::new() } else { seen_on_grid(bodies, &camera, &PixelGrid::of(&camera)) };
     // From inside of a part nothing is seen; one mistake is one diagnostic.
     let mut diagnostics = match blocked::camera(design, station, bodies, &camera) {
         Some(fault) => vec![fault],

@@ -11,7 +11,7 @@
 //! nuisance directions N (the ideal linear observer; Barrett and Myers 2004, §13.2). At the asked rate of false rejects a
 //! fault then escapes with Φ(z - d').
 
-use super::choose::{self, Choice, Scored, Target, chosen, demands, first, paper_table, ranked};
+use super::choose::{self, Asks, Choice, Scored, Target, chosen, demands, first, paper_table, ranked};
 use super::cover::fewest;
 use super::item_buffer::{ItemBuffer, Mask, PixelGrid};
 use super::lock::is_auto;
@@ -105,6 +105,7 @@ pub struct Task<'a> {
     pub modes: &'a [ErrorMode],
     /// One per component, at nominal.
     pub solids: &'a [Arc<Solid>],
+    pub asks: Asks,
 }
 
 /// Chooses the station's camera by the paper's score and weighs the views that it puts first. A fixed camera is a choice of
@@ -113,7 +114,7 @@ pub fn choose(task: &Task) -> Choice {
     let table = table(task);
     let best = first(&table);
     if !is_auto(task.station) {
-        return chosen(task.design, task.station, task.bodies, table, best);
+        return chosen(task.design, task.station, task.bodies, (table, best), task.asks);
     }
     let weighed = weigh(task, &table, &shortlist(&table, SHORTLIST));
     finished(task, table, best, weighed)
@@ -124,7 +125,7 @@ pub fn keep(task: &Task, placing: Placed) -> Choice {
     let mut table = table(task);
     let best = table.iter().position(|view| view.placing == placing).unwrap_or(table.len());
     if best == table.len() {
-        table.extend(choose::keep(task.design, task.station, task.bodies, task.targets, placing).table);
+        table.extend(choose::keep(task.design, task.station, task.bodies, task.targets, placing, Asks::Whether).table);
     }
     let mut views = shortlist(&table, SHORTLIST);
     if !views.contains(&best) {
@@ -137,7 +138,7 @@ pub fn keep(task: &Task, placing: Placed) -> Choice {
 fn finished(task: &Task, table: Vec<Scored>, best: usize, shortlist: Vec<Weighed>) -> Choice {
     let first = shortlist.iter().position(|w| w.view == best).unwrap_or(0);
     let cameras = fewest(&shortlist, first).into_iter().map(|i| shortlist[i].view).collect();
-    Choice { shortlist, cameras, ..chosen(task.design, task.station, task.bodies, table, best) }
+    Choice { shortlist, cameras, ..chosen(task.design, task.station, task.bodies, (table, best), task.asks) }
 }
 
 fn table(task: &Task) -> Vec<Scored> {

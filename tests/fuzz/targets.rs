@@ -66,15 +66,47 @@ pub fn spec(text: &[u8]) {
     gonogo::compile("fuzz.gng", &read, &options, &|_| {});
 }
 
-/// The text of a spec, parsed, resolved and laid out.
+/// The text of a spec, parsed, resolved and laid out; what has been laid out stays as it is.
 #[cfg(feature = "compile")]
 pub fn syntax(text: &[u8]) {
     let Ok(text) = std::str::from_utf8(text) else { return };
+    if let Ok(laid_out) = gonogo::syntax::format(text) {
+        assert_eq!(gonogo::syntax::format(&laid_out).as_ref(), Ok(&laid_out));
+    }
     let read = |name: &str| match name {
         "fuzz.gng" => Ok(text.to_string()),
         other => Err(std::io::Error::new(std::io::ErrorKind::NotFound, other.to_string())),
     };
     gonogo::design::load("fuzz.gng", &read, &[]);
+}
+
+/// The text of an OpenSCAD design. What is made of it is a spec that reads.
+#[cfg(feature = "compile")]
+pub fn import(text: &[u8]) {
+    let Ok(text) = std::str::from_utf8(text) else { return };
+    if let Ok(part) = gonogo::import::openscad(text, "fuzz.csg", "part_1") {
+        assert_eq!(gonogo::syntax::parse(&part, 0).1, [], "{part}");
+        let loaded = gonogo::design::load("fuzz.gng", &|_| Ok(part.clone()), &[]);
+        let unread = loaded.diagnostics.iter().find(|d| ["E0201", "E0202", "E0203", "E0204"].contains(&d.code));
+        assert!(unread.is_none(), "{unread:?}\n{part}");
+    }
+}
+
+/// Messages of an editor, one a line: `[method, parameters]`. Those that are no JSON are left out: the wire does not let them
+/// through.
+#[cfg(feature = "cli")]
+pub fn messages(lines: &[u8]) {
+    use gonogo::lsp::Server;
+    let missing = |_: &str| Err(std::io::Error::from(std::io::ErrorKind::NotFound));
+    let mut server = Server::new(Box::new(missing));
+    let _ = server.request("initialize", serde_json::json!({}));
+    for line in String::from_utf8_lossy(lines).lines() {
+        let Ok((method, params)) = serde_json::from_str::<(String, serde_json::Value)>(line) else { continue };
+        let _ = server.request(&method, params.clone());
+        let _ = server.notification(&method, params);
+        server.refresh();
+        server.jobs();
+    }
 }
 
 /// A text with the digest that fits.

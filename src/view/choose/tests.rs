@@ -177,3 +177,21 @@ fn the_table_does_not_depend_on_the_number_of_threads() {
     assert_eq!(one.table, three.table);
     assert_eq!(one.best, three.best);
 }
+
+#[test]
+fn a_camera_is_looked_through_in_full_wherever_the_search_leaves_a_doubt() {
+    let (design, station, bodies) = (design(3, &[0, 2]), station(overhead_fixed()), niche());
+    let (mut doubts, mut faults) = (0, 0);
+    for distance in [350.0, 900.0, 4000.0] {
+        for step in 0..16 {
+            let elevation = (5.0 + 25.0 * f64::from(step / 8)).to_radians();
+            let placing = Placed { distance, elevation, azimuth: f64::from(step % 8) * TAU / 8.0 };
+            let [full, quick] = [Asks::What, Asks::Whether].map(|a| keep(&design, &station, &bodies, &[], placing, a));
+            assert_eq!(full.diagnostics, quick.diagnostics, "{placing:?}");
+            assert_eq!((full.seen.is_empty(), full.camera), (false, quick.camera));
+            doubts += usize::from(!quick.seen.is_empty());
+            faults += full.diagnostics.len();
+        }
+    }
+    assert!(doubts > 0 && doubts < 48 && faults > 0, "{doubts} {faults}");
+}

@@ -54,6 +54,7 @@ impl Bench {
             targets: &self.targets,
             modes: &self.modes,
             solids: &self.solids,
+            asks: Asks::What,
         }
     }
 

@@ -3,7 +3,7 @@
 //! In: what was found about a golden. Out: a line with its file, its verdict and every difference; and one at the end with
 //! the count of each. Keys are only ever added; `reason` tells these lines from diagnostics.
 
-use super::output::{self, Failure};
+use crate::cli::output::{self, Failure};
 use crate::golden::{Allowed, Difference};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
