@@ -4,6 +4,7 @@
 
 use super::camera::let_through;
 use super::grid::Grid;
+use super::math::power_f32;
 use image::metadata::Orientation;
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use serde::{Deserialize, Serialize};
@@ -283,7 +284,7 @@ impl Curve {
 }
 
 fn srgb_to_linear(v: f32) -> f32 {
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+    if v <= 0.04045 { v / 12.92 } else { power_f32((v + 0.055) / 1.055, 2.4) }
 }
 
 #[cfg(test)]

@@ -14,13 +14,7 @@ assert.throws(() => gonogo.open(new Uint8Array()), /E0803/);
 assert.throws(() => gonogo.open(model.subarray(0, model.length / 2)), /E0802/);
 assert.throws(() => gonogo.open(model, good), /E0803/);
 assert.equal(gonogo.open(model).judge("uncalibrated", good).photo, "uncalibrated");
-// Following edges adds up thousands of px in floating point; the last digits are the machine's own.
-const [here, there] = [gonogo.calibrate(model, good), calibration.toString()].map((text) => text.split("// digest")[0]);
-const numbers = (text) => text.match(/-?\d+\.\d+(e-?\d+)?/g).map(Number);
-const words = (text) => text.replace(/-?\d+(\.\d+)?(e-?\d+)?/g, "0");
-assert.equal(words(here).split("references")[0], words(there).split("references")[0]);
-const apart = numbers(here).map((v, i) => Math.abs(v - numbers(there)[i]) / Math.max(1, Math.abs(v)));
-assert.ok(Math.max(...apart) < 1e-5, `numbers differ by ${Math.max(...apart)}`);
+assert.equal(gonogo.calibrate(model, good), calibration.toString());
 
 const inspector = gonogo.open(model, calibration);
 const { width, height } = inspector;
