@@ -26,6 +26,15 @@ assert.match(inspector.judgePixels("x", { ...black, width: 3 }).reason, /E0804/)
 assert.throws(() => inspector.judgePixels("x", { ...black, format: 9, stride: width }), /9/);
 for (const photo of photos) console.log(inspector.judgeText(photo, readFileSync(photo)));
 
+// Shown, a photo has the same verdict, boxes and scores, and its grey values are those that were judged.
+const { text, grey } = inspector.show(photos[0], good);
+assert.ok(text.startsWith(inspector.judgeText(photos[0], good).slice(0, -1)));
+const { decoded, nodes, outline } = JSON.parse(text);
+assert.ok(decoded && nodes.length > 0 && outline.length === 4 && nodes.every((n) => !n.faulty && n.outline.length === 4));
+const again = inspector.judgePixels(photos[0], { data: grey, width, height, format: GREY8 });
+assert.deepEqual(again, inspector.judge(photos[0], good));
+assert.equal(JSON.parse(inspector.show("x", good.subarray(0, 99)).text).decoded, false);
+
 // Judging again and again takes no more memory.
 const before = process.memoryUsage().arrayBuffers;
 for (let i = 0; i < 20; i++) inspector.judgeText("again", good);
