@@ -24,12 +24,15 @@ pub const SCRIPT: &str = concat!(include_str!("../../include/gonogo.mjs"), inclu
 pub fn section(report: &Report) -> Option<String> {
     let (judge, trained) = report.judge.zip(report.model)?;
     let Trained { model, .. } = trained;
-    let megabytes = |bytes: usize| format!("{} MB", number(bytes as f64 / 1e6, 1));
+    let size = |bytes: usize| match bytes as f64 / 1e6 {
+        small if small < 0.1 => format!("{} kB", number(1e3 * small, 0)),
+        large => format!("{} MB", number(large, 1)),
+    };
     let mut carried = vec![
-        format!("the runtime ({})", megabytes(judge.module.bytes().len())),
-        format!("the model ({})", megabytes(judge.model.len())),
+        format!("the runtime ({})", size(judge.module.bytes().len())),
+        format!("the model ({})", size(judge.model.len())),
     ];
-    carried.extend(judge.calibration.map(|text| format!("its calibration ({})", megabytes(text.len()))));
+    carried.extend(judge.calibration.map(|text| format!("its calibration ({})", size(text.len()))));
     let [width, height] = model.station.camera.size;
     let uncalibrated = match judge.calibration {
         Some(_) => "",
