@@ -84,6 +84,13 @@ int32_t gonogo_judge_file(const gonogo_inspector *inspector, const char *name, c
 int32_t gonogo_judge_pixels(const gonogo_inspector *inspector, const char *name, const gonogo_image *image,
                             gonogo_text *verdict);
 
+/* Judges an image file and shows it. `verdict` gets the same line with more keys at its end: "decoded", "locator_score",
+ * "outline" (corners of the assembly's box, px) and "nodes" (of each: node, level, faulty, explained, fault, score, outline).
+ * `grey`, if not null, has room for `grey_size` bytes, at least width times height of them: where "decoded" is true it gets the
+ * photo's grey values as they were judged, 8 bits a pixel, top row first, upright. */
+int32_t gonogo_show_file(const gonogo_inspector *inspector, const char *name, const uint8_t *file, size_t file_size,
+                         uint8_t *grey, size_t grey_size, gonogo_text *verdict);
+
 /* Fits a model to its station by an image file of a correct assembly. `calibration` gets the text of the calibration, or the
  * reason why the photo is refused. */
 int32_t gonogo_calibrate(const uint8_t *model, size_t model_size, const uint8_t *photo, size_t photo_size,

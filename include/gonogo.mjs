@@ -72,6 +72,15 @@ class Gonogo {
     });
   }
 
+  _show(handle, name, file, pixels) {
+    return this.#borrowing((lend) => {
+      const [n, f, grey] = [lend(zeroEnded(name)), lend(file), lend(new Uint8Array(pixels))];
+      const { gonogo_show_file, memory } = this.#exports;
+      const text = this.#verdict((out) => gonogo_show_file(handle, n.at, f.at, f.size, grey.at, grey.size, out));
+      return { text, grey: new Uint8Array(memory.buffer.slice(grey.at, grey.at + grey.size)) };
+    });
+  }
+
   _judgePixels(handle, name, { data, width, height, format = RGBA8, stride = width * BYTES[format] }) {
     return this.#borrowing((lend) => {
       const bytes = new Uint8Array(data.buffer, data.byteOffset, data.byteLength);
@@ -141,6 +150,11 @@ class Inspector {
   /** The same as the line of JSON. */
   judgeText(name, file) {
     return this.#gonogo._judge(this.#handle, name, file);
+  }
+
+  /** The line of JSON with boxes and scores (see gonogo.h), and the photo's grey values as they were judged. */
+  show(name, file) {
+    return this.#gonogo._show(this.#handle, name, file, this.width * this.height);
   }
 
   /** The verdict on pixels: `{ data, width, height, format = RGBA8, stride }`, as a canvas gives them. */

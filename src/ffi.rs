@@ -133,6 +133,35 @@ pub unsafe extern "C" fn gonogo_judge_file(
 }
 
 /// # Safety
+/// The pointers are null or as the header says; `grey` is null or `grey_size` bytes there may be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn gonogo_show_file(
+    inspector: *const Session,
+    name: *const c_char,
+    file: *const u8,
+    file_size: usize,
+    grey: *mut u8,
+    grey_size: usize,
+    verdict: *mut Text,
+) -> i32 {
+    answer(verdict, || {
+        // SAFETY: the caller's word on pointers and sizes.
+        let (session, name) = unsafe { (session(inspector)?, name_of(name)) };
+        let file = unsafe { bytes(file, file_size, "file") }?;
+        let [width, height] = session.size().map(|s| s as usize);
+        if !grey.is_null() && grey_size < width * height {
+            return Err((BAD_ARGUMENT, format!("`grey` has {grey_size} bytes for {width}x{height} px")));
+        }
+        let (outcome, pixels) = session.show_file(&name, file);
+        if let Some(pixels) = pixels.as_ref().filter(|p| !grey.is_null() && p.len() <= grey_size) {
+            // SAFETY: not null, as large as the caller says, and our own vector is not the caller's memory.
+            unsafe { ptr::copy_nonoverlapping(pixels.as_ptr(), grey, pixels.len()) };
+        }
+        Ok((judged(&outcome).0, outcome.json_in_full(pixels.is_some())))
+    })
+}
+
+/// # Safety
 /// The pointers are null or as the header says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gonogo_judge_pixels(
@@ -181,6 +210,15 @@ pub unsafe extern "C" fn gonogo_text_free(text: *mut Text) {
     }
     *text = Text { data: ptr::null_mut(), size: 0 };
 }
+
+/// The version once more, in a custom section `gonogo` of the module: it can be read without running it.
+#[cfg(target_family = "wasm")]
+#[used]
+#[unsafe(link_section = "gonogo")]
+static VERSION: [u8; env!("CARGO_PKG_VERSION").len()] = *{
+    let version = env!("CARGO_PKG_VERSION").as_bytes();
+    version.first_chunk().expect("an array as long as the text")
+};
 
 /// Memory for the host to fill, where it has no allocator of its own: in a browser. Null for no bytes or none left.
 #[cfg(target_family = "wasm")]

@@ -8,6 +8,8 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 
+mod webassembly;
+
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
 /// A folder of one test's own.
@@ -167,6 +169,25 @@ impl Tab {
         self.settle();
     }
 
+    /// Chooses a file in an input.
+    fn choose(&mut self, id: &str, path: &str) {
+        let input = self.call("Runtime.evaluate", json!({"expression": format!("document.getElementById('{id}')")}));
+        let id = &input["result"]["objectId"];
+        self.call("DOM.setFileInputFiles", json!({"files": [path], "objectId": id}));
+    }
+
+    /// Drops a file on an element, as from a file manager.
+    fn drop_at(&mut self, id: &str, path: &str) {
+        let at = self.value(&format!(
+            "(() => {{ const e = document.getElementById('{id}'); e.scrollIntoView({{ block: 'center' }}); \
+             const b = e.getBoundingClientRect(); return [b.left + b.width / 2, b.top + b.height / 2]; }})()"
+        ));
+        let data = json!({"items": [], "files": [path], "dragOperationsMask": 1});
+        for kind in ["dragEnter", "dragOver", "drop"] {
+            self.call("Input.dispatchDragEvent", json!({"type": kind, "x": at[0], "y": at[1], "data": data}));
+        }
+    }
+
     /// Where a face of that name is seen in the window.
     fn find(&mut self, face: &str) -> Option<[f64; 2]> {
         let found = self.value(&format!(
@@ -303,6 +324,85 @@ fn photos_and_promises_can_be_looked_at() {
     tab.value("document.querySelector('#photo-1 .drawn g.faulty').dispatchEvent(new MouseEvent('mouseenter'))");
     assert_eq!(counted(&mut tab, ".parts button.on"), json!(1));
     assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+/// A person chooses a photo, then drops another: the page judges both as the command line does, to the letter.
+#[test]
+fn the_page_judges_photos_itself() {
+    let Some(name) = browser() else { return };
+    let Some(module) = webassembly::module() else { return };
+    let folder = folder("report_judge");
+    let page = judged(&folder);
+    let without = fs::read_to_string(&page).unwrap();
+    assert!(!without.contains("wasm-unsafe-eval") && !without.contains("id=\"judge\""));
+    let model = ["--model", "plate.model.ron", "--calibration", "plate.calibration.ron"];
+    let judge = ["--judge", module.to_str().unwrap()];
+    gonogo(&folder, &[&["report", "plate.gng", "-o", "report.html"], &model[..], &judge].concat());
+    let photos = ["good.png", SPITE, "rubbish.png"];
+    let mut native = Command::new(env!("CARGO_BIN_EXE_gonogo"));
+    native.current_dir(&folder).args(["inspect", "plate.model.ron", "--calibration", "plate.calibration.ron"]);
+    let native = native.args(["--format", "json"]).args(photos).output().unwrap();
+    let native = String::from_utf8(native.stdout).unwrap();
+    let native: Vec<&str> = native.lines().map(|line| line.split_once(",\"milliseconds\"").unwrap().0).collect();
+    assert_eq!(native.len(), 3);
+
+    let mut tab = Tab::open(name, &folder, &page, [1280, 900]);
+    let path = |photo: &str| folder.join(photo).to_str().unwrap().to_string();
+    tab.choose("judge-files", &path(photos[0]));
+    tab.until("gonogo.judged.length === 1");
+    tab.drop_at("judge-drop", &path(photos[1]));
+    tab.until("gonogo.judged.length === 2");
+    tab.choose("judge-files", &path(photos[2]));
+    tab.until("gonogo.judged.length === 3");
+
+    for (i, native) in native.iter().enumerate() {
+        let line = tab.text(&format!("gonogo.judged[{i}].split(',\"milliseconds\"')[0]"));
+        assert_eq!(line, *native);
+    }
+    // The newest on top.
+    let seen = tab.value("[...document.querySelectorAll('#judge-photos .photo .verdict')].map((v) => v.textContent)");
+    assert_eq!(seen, json!(["cannot inspect", "no-go", "go"]));
+    let counted = |tab: &mut Tab, what: &str| {
+        tab.value(&format!("document.querySelectorAll({}).length", json!(format!("#judge-photos .photo{what}"))))
+    };
+    assert_eq!(counted(&mut tab, ":nth-child(3) .drawn g.good"), json!(2));
+    assert_eq!(counted(&mut tab, ":nth-child(2) .drawn g.faulty path"), json!(1));
+    assert_eq!(counted(&mut tab, ":nth-child(2) .strips .faulty .mark.nogo"), json!(1));
+    assert_eq!(counted(&mut tab, ":nth-child(1) svg"), json!(0), "rubbish has no picture");
+    assert!(!tab.text("document.title").contains("broken"));
+    // What is shown is what was judged: the picture's grey values are the file's.
+    let shown = tab.text("document.querySelector('#judge-photos .photo:nth-child(3) image').getAttribute('href')");
+    let shown = tab.value(&format!(
+        "new Promise((done) => {{ const i = new Image(); i.onload = () => {{ const c = document.createElement('canvas'); \
+         c.width = i.naturalWidth; c.height = i.naturalHeight; const x = c.getContext('2d'); x.drawImage(i, 0, 0); \
+         done([...x.getImageData(0, 0, c.width, c.height).data].filter((_, k) => k % 4 === 1)); }}; i.src = {}; }})",
+        json!(shown)
+    ));
+    let file = image::open(folder.join(photos[0])).unwrap().into_luma8();
+    assert!(shown == json!(file.as_raw()), "other grey values are shown");
+    // Pointing at a box there points at the component in 3-D.
+    tab.value("document.querySelector('#judge-photos g.faulty').dispatchEvent(new MouseEvent('mouseenter'))");
+    assert_eq!(tab.value("document.querySelectorAll('.parts button.on').length"), json!(1));
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn what_is_no_module_of_this_version_is_refused() {
+    let folder = folder("report_no_module");
+    let page = judged(&folder);
+    let before = fs::read(&page).unwrap();
+    fs::write(folder.join("no.wasm"), b"\0asm\x01\0\0\0").unwrap();
+    for (module, why) in
+        [("good.png", "no WebAssembly module"), ("no.wasm", "not the runtime's"), ("none.wasm", "none.wasm")]
+    {
+        let mut report = Command::new(env!("CARGO_BIN_EXE_gonogo"));
+        report.args(["report", "plate.gng", "--model", "plate.model.ron", "--judge", module]).current_dir(&folder);
+        let output = report.output().unwrap();
+        assert_eq!(output.status.code(), Some(2));
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains(why), "{said}");
+    }
+    assert!(fs::read(&page).unwrap() == before, "the page was written all the same");
 }
 
 #[test]

@@ -243,6 +243,10 @@ pub struct Report {
     /// What `gonogo calibrate` wrote. Without it, camera and lamps are taken to be as the spec says.
     #[arg(long, value_name = "FILE", requires = "model")]
     pub calibration: Option<PathBuf>,
+    /// The runtime for browsers (`tools/wasm.sh` makes it): the page then judges photos that are dropped on it. It carries module
+    /// and model, so it has a third more bytes than they.
+    #[arg(long, value_name = "WASM", requires = "model")]
+    pub judge: Option<PathBuf>,
     /// Where the page goes: one HTML file that needs no other.
     #[arg(short, long, value_name = "PAGE", default_value = "report.html")]
     pub output: PathBuf,

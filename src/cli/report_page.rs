@@ -4,7 +4,7 @@ use super::args::{Global, Report};
 use super::compile::{self, Document};
 use super::output::{self, Failure};
 use super::{Exit, judge, keep};
-use crate::report::{self, Assembly, Shot, Trained, View};
+use crate::report::{self, Assembly, Judge, Module, Shot, Trained, View};
 use crate::runtime::calibrate::Calibration;
 use crate::runtime::inspect::{Inspector, Verdict};
 use crate::runtime::model::{Model, is_rig};
@@ -39,9 +39,28 @@ pub fn report(args: &Report, global: &Global) -> Result<Exit, Failure> {
         Some(model) => judged(args, model, calibration.as_ref())?,
         None => Vec::new(),
     };
-    let page = page(&spec.name, &compiled, model.as_ref(), calibration.as_ref(), &judged);
+    let carried = carried(args)?;
+    let page = with(&spec.name, &compiled, model.as_ref(), calibration.as_ref(), &judged, carried.as_ref());
     output::write(&args.output, page.as_bytes())?;
     Ok(if fine { Exit::Fine } else { Exit::Faults })
+}
+
+/// The files that a page carries which judges.
+struct Carried {
+    module: Vec<u8>,
+    model: String,
+    calibration: Option<String>,
+}
+
+fn carried(args: &Report) -> Result<Option<Carried>, Failure> {
+    let (Some(path), Some(model)) = (&args.judge, &args.model) else { return Ok(None) };
+    let module = output::read(path)?;
+    Module::read(&module).map_err(|why| {
+        let path = path.display();
+        Failure(format!("`{path}`: {why}; `tools/wasm.sh gonogo.wasm` in the sources of this version makes one"))
+    })?;
+    let calibration = args.calibration.as_deref().map(output::read_text).transpose()?;
+    Ok(Some(Carried { module, model: output::read_text(model)?, calibration }))
 }
 
 /// The model; that of several cameras is not shown yet.
@@ -97,6 +116,21 @@ pub fn page(
     calibration: Option<&Calibration>,
     judged: &[Judged],
 ) -> String {
+    with(spec, compiled, model, calibration, judged, None)
+}
+
+fn with(
+    spec: &str,
+    compiled: &Compiled,
+    model: Option<&Model>,
+    calibration: Option<&Calibration>,
+    judged: &[Judged],
+    carried: Option<&Carried>,
+) -> String {
+    let judge = carried.and_then(|c| {
+        let module = Module::read(&c.module).ok()?;
+        Some(Judge { module, model: &c.model, calibration: c.calibration.as_deref() })
+    });
     let made = &compiled.made;
     let assembly = made.design.as_ref().map(|design| Assembly {
         design,
@@ -127,5 +161,6 @@ pub fn page(
         others: &others,
         model: model.map(|model| Trained { model, calibration, fits: model.spec == made.digest }),
         photos: &photos,
+        judge,
     })
 }

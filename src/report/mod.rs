@@ -9,7 +9,9 @@ mod colour;
 mod drawings;
 mod findings;
 mod html;
+mod judge;
 mod measures;
+mod module;
 mod parts;
 mod photos;
 mod picture;
@@ -20,6 +22,8 @@ mod templates;
 mod title;
 mod views;
 
+pub use judge::Judge;
+pub use module::Module;
 #[cfg(feature = "cli")]
 pub(crate) use photos::shrunk;
 
@@ -54,6 +58,8 @@ pub struct Report<'a> {
     pub others: &'a [View<'a>],
     pub model: Option<Trained<'a>>,
     pub photos: &'a [Shot<'a>],
+    /// What lets the page judge photos itself.
+    pub judge: Option<Judge<'a>>,
 }
 
 /// What the spec describes.
@@ -109,14 +115,18 @@ pub fn page(report: &Report) -> String {
         title::title(report),
         title::colophon(report)
     );
-    let scripts = [VIEWER, PAGE];
-    let nonce = nonce(&[&content, &payload, VIEWER, PAGE]);
+    let judge = report.judge.filter(|_| report.model.is_some()).map(|judge| judge::payload(&judge));
+    let nonce = nonce(&[&content, &payload, judge.as_deref().unwrap_or_default(), VIEWER, PAGE]);
+    // A module may be compiled where the page carries one; there is nowhere to load another from.
+    let compiling = if judge.is_some() { " 'wasm-unsafe-eval'" } else { "" };
     let policy = format!(
-        "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'nonce-{nonce}'; \
+        "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'nonce-{nonce}'{compiling}; \
          base-uri 'none'; form-action 'none'"
     );
     let name = report.assembly.map_or(report.spec, |a| a.design.name.as_str());
-    let scripts: String = scripts.iter().map(|s| format!("<script nonce=\"{nonce}\">\n{s}</script>\n")).collect();
+    let script = |kind: &str, text: &str| format!("<script{kind} nonce=\"{nonce}\">\n{text}</script>\n");
+    let judge = judge.map(|blocks| blocks + &script(" type=\"module\"", judge::SCRIPT)).unwrap_or_default();
+    let scripts = [script("", VIEWER), script("", PAGE), judge].concat();
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"{policy}\">\n\
@@ -165,6 +175,7 @@ fn sections(report: &Report) -> Vec<Section> {
     );
     add("promise", "What can be told", report.model.map(|m| promise::section(&m, report)));
     add("photos", "Photos", photos::section(report));
+    add("judge", "Judge a photo", judge::section(report));
     add("findings", "Findings in the spec", Some(findings::section(report)));
     all
 }

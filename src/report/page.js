@@ -177,7 +177,7 @@
     show(!!through);
   }
 
-  for (const e of all('[data-c]')) {
+  function pointable(e) {
     const at = { component: Number(e.dataset.c), face: null };
     e.addEventListener('mouseenter', () => point(at));
     e.addEventListener('mouseleave', () => point(null));
@@ -187,6 +187,7 @@
       e.onclick = () => select(state.selected && state.selected.component === at.component && state.selected.face === null ? null : at);
     }
   }
+  all('[data-c]').forEach(pointable);
 
   // Names in the drawings point at what they name.
   const byName = new Map();
@@ -322,5 +323,5 @@
   show();
 
   // For tests and for the curious: the same as a pointer would find.
-  window.gonogo = { viewer, select, find: (name) => { const at = byName.get(name); return at && at.face !== null ? viewer.where(at.component, at.face) : null; } };
+  window.gonogo = { viewer, select, pointable, find: (name) => { const at = byName.get(name); return at && at.face !== null ? viewer.where(at.component, at.face) : null; } };
 })();

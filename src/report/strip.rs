@@ -21,6 +21,11 @@ pub struct Mark {
     pub name: String,
 }
 
+/// Both ends of a node's strip; `None` without held-out scores.
+pub fn scale(node: &Node) -> Option<[f64; 2]> {
+    Scale::of(node).map(|scale| [scale.low, scale.high])
+}
+
 pub fn strip(node: &Node, marks: &[Mark]) -> String {
     let Some(scale) = Scale::of(node) else { return marks.iter().map(|m| number(m.score, 3)).collect() };
     let ticks = |scores: &[f64], from: f64, to: f64| -> String {

@@ -87,6 +87,10 @@ fn verdict() -> Verdict {
 }
 
 fn written(bench: &Bench, model: &Model) -> String {
+    judging(bench, model, None)
+}
+
+fn judging(bench: &Bench, model: &Model, judge: Option<Judge>) -> String {
     let verdict = verdict();
     let grey = image::GrayImage::new(16, 12);
     let shot = Shot { name: SPITE, grey: Some(&grey), photo: None, verdict: &verdict };
@@ -105,6 +109,7 @@ fn written(bench: &Bench, model: &Model) -> String {
         view: None,
         model: Some(Trained { model, calibration: None, fits: false }),
         photos: &[shot],
+        judge,
     })
 }
 
@@ -201,6 +206,33 @@ fn data_can_be_read_back() {
 }
 
 #[test]
+fn a_page_that_judges_may_compile_its_module_and_no_more() {
+    let (bench, module, mut model) = (bench(|_| ()), module::tests::whole(), model());
+    let plain = written(&bench, &model);
+    assert!(!plain.contains("wasm-unsafe-eval") && !plain.contains("type=\"module\""));
+    model.nodes[0].name = SPITE.into();
+    model.station.name = SPITE.into();
+    let judge = Judge { module: Module::read(&module).unwrap(), model: SPITE, calibration: None };
+    let page = judging(&bench, &model, Some(judge));
+    let policy = page.split_once("Policy\" content=\"").unwrap().1.split_once('"').unwrap().0;
+    let scripts = policy.split("; ").find(|p| p.starts_with("script-src")).unwrap();
+    let words: Vec<&str> = scripts.split(' ').collect();
+    assert!(words.len() == 3 && words[1].starts_with("'nonce-") && words[2] == "'wasm-unsafe-eval'", "{policy}");
+    assert!(policy.starts_with("default-src 'none'") && !policy.contains("connect-src"));
+    assert!(page.contains("<section id=\"judge\"") && page.contains("Without a calibration"));
+    assert!(!page.contains("<img src=x") && !page.contains("</script><img"));
+    let block =
+        |id: &str| page.split_once(&format!("id=\"judge-{id}\">")).unwrap().1.split_once("</script>").unwrap().0;
+    assert_eq!(block("model"), html::base64(SPITE.as_bytes()));
+    assert_eq!(block("module"), html::base64(&module));
+    for tag in ["section", "template", "table", "tbody", "tr", "details", "label", "div", "span"] {
+        let opened = tags(&page).iter().filter(|t| **t == tag).count();
+        let content = page.split_once("<script nonce").unwrap().0;
+        assert_eq!(opened, content.matches(&format!("</{tag}>")).count(), "<{tag}>");
+    }
+}
+
+#[test]
 fn a_doubtful_promise_is_marked() {
     let page = written(&bench(|_| ()), &model());
     assert!(page.contains("W0703: hardly told") && page.contains("another version of this spec"));
@@ -220,6 +252,7 @@ fn a_spec_that_cannot_be_read_still_has_a_page() {
         view: None,
         model: None,
         photos: &[],
+        judge: None,
     };
     let page = page(&report);
     assert!(page.contains("E0101") && page.contains("1</b><span>error in the spec"));

@@ -7,6 +7,7 @@
 //! dark parts into "no edge, large variance".
 
 use super::linear;
+use super::math::{ln, ln_product};
 use std::ops::Range;
 
 /// Learned directions per hypothesis.
@@ -83,8 +84,8 @@ impl Density {
         }
         // I + WᵀΛW is positive definite; only non-finite coefficients could make it fail.
         let factor = linear::cholesky(&gram, n).unwrap_or_else(|| identity(n));
-        let log_det: f64 = (0..n).map(|i| factor[i * n + i].ln() * 2.0).sum();
-        let log_precision: f64 = precision.iter().map(|&p| f64::from(p).ln()).sum();
+        let log_det: f64 = (0..n).map(|i| ln(factor[i * n + i]) * 2.0).sum();
+        let log_precision: f64 = ln_product(precision.iter().map(|&p| f64::from(p)));
         Density { mean, columns, precision, factor, log_norm: (log_precision - log_det) / 2.0 }
     }
 
@@ -141,7 +142,7 @@ impl Density {
     /// Per coefficient, minus the logarithm of the noise's density relative to its peak: 0 for one as expected.
     pub fn surprise(&self, z: &[f32]) -> Vec<f32> {
         let rest = self.residual(z, &self.nuisances(z));
-        let tail = |r: &f32| ((STUDENT + 1.0) / 2.0 * (1.0 + f64::from(r * r) / STUDENT).ln()) as f32;
+        let tail = |r: &f32| ((STUDENT + 1.0) / 2.0 * ln(1.0 + f64::from(r * r) / STUDENT)) as f32;
         rest.iter().map(tail).collect()
     }
 
@@ -230,7 +231,7 @@ fn weighted(a: &[f32], weights: &[f32]) -> Vec<f32> {
 fn log_tails(rest: &[f32]) -> f64 {
     const FACTORS: usize = 7;
     let tail = |&r: &f32| 1.0 + f64::from(r * r) / STUDENT;
-    rest.chunks(FACTORS).map(|rest| rest.iter().map(tail).product::<f64>().ln()).sum()
+    ln_product(rest.chunks(FACTORS).map(|rest| rest.iter().map(tail).product()))
 }
 
 /// Variance per coefficient: the draws', shrunk towards its level's median, not below the floor.

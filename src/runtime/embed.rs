@@ -40,6 +40,13 @@ impl Session {
         self.judge(name, Photo::decode(bytes, self.tone(), self.size()))
     }
 
+    /// The same, and the photo's grey values for people, one byte a pixel; `None` where it could not be decoded.
+    pub fn show_file(&self, name: &str, bytes: &[u8]) -> (Outcome, Option<Vec<u8>>) {
+        let photo = Photo::decode(bytes, self.tone(), self.size());
+        let grey = photo.as_ref().ok().map(|photo| photo.grey(self.tone()));
+        (self.judge(name, photo), grey)
+    }
+
     /// Judges pixels in memory.
     pub fn judge_pixels(&self, name: &str, pixels: &Pixels) -> Outcome {
         self.judge(name, Photo::from_pixels(pixels, self.tone(), self.size()))

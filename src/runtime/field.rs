@@ -4,6 +4,7 @@
 //! are worked out where they are asked for: a search asks for few of them. Never knows what it looks for.
 
 use super::grid::Grid;
+use super::math::length_f32;
 
 /// Gradient directions of a photo at one resolution.
 pub struct Field {
@@ -17,15 +18,18 @@ pub struct Field {
 
 /// A vector of the same length at twice the angle: the same for both polarities of an edge.
 pub fn doubled([x, y]: [f32; 2]) -> [f32; 2] {
-    let length = x.hypot(y).max(f32::MIN_POSITIVE);
+    let length = length_f32(x, y).max(f32::MIN_POSITIVE);
     [(x * x - y * y) / length, 2.0 * x * y / length]
 }
 
 /// A vector of the same length at half the angle.
 pub fn halved([x, y]: [f32; 2]) -> [f32; 2] {
-    let (sin, cos) = (y.atan2(x) / 2.0).sin_cos();
-    let length = x.hypot(y);
-    [length * cos, length * sin]
+    // The square root of a complex number, brought to length: its larger part from the length, the other from the product.
+    let length = length_f32(x, y);
+    let large = ((length + x.abs()) / 2.0).sqrt();
+    let small = if large > 0.0 { y.abs() / (2.0 * large) } else { 0.0 };
+    let (cos, sin) = if x < 0.0 { (small, large) } else { (large, small) };
+    [cos, sin.copysign(y)].map(|v| v * length.sqrt())
 }
 
 impl Field {

@@ -6,6 +6,7 @@
 
 use super::grid::Grid;
 use super::linear;
+use super::math::power;
 use super::model::Lamp;
 
 /// Lamps whose power drifts by more than this share are left open.
@@ -88,7 +89,7 @@ pub fn range(power: f64, drift: f64) -> [f64; 2] {
 
 /// The weight at `u` in 0..1 of a log-uniform lamp; 0 for a lamp that gives nothing.
 pub fn within([low, high]: &[f64; 2], u: f64) -> f64 {
-    if *low > 0.0 { low * (high / low).powf(u) } else { 0.0 }
+    if *low > 0.0 { low * power(high / low, u) } else { 0.0 }
 }
 
 fn mixed(images: &[Grid], weights: &[f64]) -> Grid {
@@ -123,9 +124,9 @@ fn levelled(mut image: Grid, surroundings: &[bool], grey: f64) -> Grid {
 fn spread_evenly(index: usize, dimensions: usize) -> Vec<f64> {
     let mut root = 1.5f64;
     for _ in 0..40 {
-        root = (1.0 + root).powf(1.0 / (dimensions + 1) as f64);
+        root = power(1.0 + root, 1.0 / (dimensions + 1) as f64);
     }
-    let step = |d: usize| root.powi(-(d as i32 + 1));
+    let step = |d: usize| (0..=d).fold(1.0, |power, _| power / root);
     (0..dimensions).map(|d| (0.5 + step(d) * (index + 1) as f64).fract()).collect()
 }
 

@@ -17,6 +17,7 @@ pub mod light;
 pub mod linear;
 pub mod locate;
 mod look;
+mod math;
 pub mod model;
 pub mod photo;
 pub mod pose;

@@ -4,6 +4,7 @@
 
 use super::camera::let_through;
 use super::grid::Grid;
+use super::math::power_f32;
 use image::metadata::Orientation;
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use serde::{Deserialize, Serialize};
@@ -91,6 +92,15 @@ impl Photo {
             PhotoError::Unreadable("its pixels are floating-point numbers: 8 or 16 bits are expected".into())
         })?;
         Ok(Photo { light: Grid::new(is[0] as usize, is[1] as usize, light) })
+    }
+
+    /// Grey values for people, row by row, on the curve of the station: what an 8-bit file holds.
+    pub fn grey(&self, tone: Tone) -> Vec<u8> {
+        let byte = |&light: &f32| {
+            let v = if tone == Tone::Srgb { linear_to_srgb(light) } else { light };
+            (v.clamp(0.0, 1.0) * 255.0).round() as u8
+        };
+        self.light.values.iter().map(byte).collect()
     }
 
     /// A photo from pixels in memory, as a camera's driver gives them.
@@ -282,8 +292,12 @@ impl Curve {
     }
 }
 
+fn linear_to_srgb(v: f32) -> f32 {
+    if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * power_f32(v, 1.0 / 2.4) - 0.055 }
+}
+
 fn srgb_to_linear(v: f32) -> f32 {
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+    if v <= 0.04045 { v / 12.92 } else { power_f32((v + 0.055) / 1.055, 2.4) }
 }
 
 #[cfg(test)]
@@ -307,6 +321,16 @@ mod tests {
         assert!(photo.light.values[0] < 0.62 * photo.light.values[24 * 64 + 32]);
         assert!(photo.flattened(0.4).light.values.iter().all(|v| (v - 0.6).abs() < 1e-6));
         assert!(matches!(photo.flattened(0.0), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn a_photo_shows_the_grey_values_it_was_decoded_from() {
+        let ramp = image::GrayImage::from_fn(256, 1, |x, _| image::Luma([x as u8]));
+        let mut png = Vec::new();
+        ramp.write_to(&mut Cursor::new(&mut png), image::ImageFormat::Png).unwrap();
+        for tone in [Tone::Linear, Tone::Srgb] {
+            assert_eq!(Photo::decode(&png, tone, [256, 1]).unwrap().grey(tone), ramp.as_raw()[..]);
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Where the assembly stands, and how the camera really hangs.
 
 use super::camera::{Camera, Vec3, cross, dot, normalise};
+use super::math::sin_cos;
 use super::model::{Install, Station};
 use serde::{Deserialize, Serialize};
 
@@ -30,13 +31,13 @@ impl Pose {
 
     /// Assembly frame to station frame.
     pub fn apply(&self, p: Vec3) -> Vec3 {
-        let (s, c) = self.rz.sin_cos();
+        let (s, c) = sin_cos(self.rz);
         [c * p[0] - s * p[1] + self.x, s * p[0] + c * p[1] + self.y, p[2] + self.z]
     }
 
     /// Station frame to assembly frame.
     pub fn invert(&self, p: Vec3) -> Vec3 {
-        let (s, c) = self.rz.sin_cos();
+        let (s, c) = sin_cos(self.rz);
         let [x, y] = [p[0] - self.x, p[1] - self.y];
         [c * x + s * y, -s * x + c * y, p[2] - self.z]
     }

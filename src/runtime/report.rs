@@ -3,7 +3,7 @@
 //! In: the name of a photo and what came of it. Out: text. The keys and their order are a contract; scripts depend on them.
 //! Written by hand because the runtime has no JSON crate; the tests hold it against one.
 
-use super::inspect::{Decision, Finding, Verdict};
+use super::inspect::{Decision, Finding, NodeReport, Verdict};
 use std::fmt::Write;
 
 /// What came of one photo.
@@ -33,6 +33,27 @@ impl Outcome {
     /// One JSON object, without the line break.
     pub fn json(&self) -> String {
         self.json_of(&[], &[])
+    }
+
+    /// The same with what a picture of it needs: `decoded` (whether the photo is an image of the right size), the locator's
+    /// score, the corners of the assembly's box (px), and per node its score, corners, level and fault.
+    pub fn json_in_full(&self, decoded: bool) -> String {
+        let mut text = self.json();
+        text.pop();
+        text += if decoded { ",\"decoded\":true" } else { ",\"decoded\":false" };
+        text += ",\"locator_score\":";
+        number(&mut text, self.verdict.locator_score, 4);
+        text += ",\"outline\":";
+        match &self.verdict.outline {
+            Some(outline) => corners(&mut text, outline),
+            None => text += "null",
+        }
+        text += ",\"nodes\":[";
+        for (i, one) in self.verdict.nodes.iter().enumerate() {
+            text += if i > 0 { "," } else { "" };
+            node(&mut text, one);
+        }
+        text + "]}"
     }
 
     /// The same for several cameras: their names and photos, and for each finding the camera that saw it.
@@ -115,6 +136,31 @@ fn finding(text: &mut String, finding: &Finding, camera: Option<&String>) {
         number(text, side, 1);
     }
     *text += "]}";
+}
+
+fn node(text: &mut String, node: &NodeReport) {
+    *text += "{\"node\":";
+    string(text, &node.name);
+    // Writing to a string cannot fail.
+    let _ = write!(text, ",\"level\":{},\"faulty\":{},\"explained\":{}", node.level, node.faulty, node.explained);
+    *text += ",\"fault\":";
+    string(text, &node.best_fault);
+    *text += ",\"score\":";
+    number(text, node.score, 6);
+    *text += ",\"outline\":";
+    corners(text, &node.outline);
+    *text += "}";
+}
+
+fn corners(text: &mut String, corners: &[[f64; 2]; 4]) {
+    for (i, [x, y]) in corners.iter().enumerate() {
+        *text += if i > 0 { ",[" } else { "[[" };
+        number(text, *x, 1);
+        *text += ",";
+        number(text, *y, 1);
+        *text += "]";
+    }
+    *text += "]";
 }
 
 /// A number with at most `decimals` decimals; what is no number is null.

@@ -5,6 +5,7 @@
 //! little, so a part that stands higher than it did shows by where it appears. Never looks at an image.
 
 use super::linear;
+use super::math::length;
 use super::model::Node;
 
 /// Standard deviation of a node's place before calibration, beside its placement (px of the photo): what pose and camera leave.
@@ -54,7 +55,7 @@ pub fn in_photo(expected: &[Expected], shifts: &[[f64; 2]], node: usize) -> Expe
         let apart = linear::median(&mut off.iter().map(|o| (o - common).abs()).collect::<Vec<_>>());
         *at += f64::from(common);
         // The median distance of a normal variable from its mean is 0.6745 standard deviations.
-        out.spread[axis] = out.spread[axis].hypot(f64::from(apart) / 0.6745);
+        out.spread[axis] = length(out.spread[axis], f64::from(apart) / 0.6745);
     }
     out
 }

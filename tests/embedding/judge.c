@@ -139,6 +139,33 @@ int main(int argc, char **argv) {
         gonogo_text_free(&text);
     }
 
+    /* Shown, a photo has boxes and scores, and its grey values are those that were judged. */
+    {
+        uint32_t width = 0, height = 0;
+        uint8_t *grey;
+        gonogo_text plain = {NULL, 0}, again = {NULL, 0};
+        gonogo_image image = {NULL, 0, 0, 0, 0, GONOGO_GREY8};
+        EXPECT(gonogo_photo_size(inspector, &width, &height) == GONOGO_OK);
+        image.size = (size_t)width * height;
+        image.stride = image.width = width;
+        image.height = height;
+        grey = malloc(image.size);
+        image.data = grey;
+        EXPECT(gonogo_show_file(inspector, "x", photo.data, photo.size, grey, image.size - 1, &text) == GONOGO_BAD_ARGUMENT);
+        expect_text(&text, "grey");
+        EXPECT(gonogo_show_file(inspector, "x", photo.data, photo.size / 2, grey, image.size, &text) == GONOGO_CANNOT_INSPECT);
+        expect_text(&text, "\"decoded\":false");
+        EXPECT(gonogo_show_file(inspector, "x", photo.data, photo.size, NULL, 0, NULL) == GONOGO_GO);
+        EXPECT(gonogo_show_file(inspector, "x", photo.data, photo.size, grey, image.size, &text) == GONOGO_GO);
+        EXPECT(gonogo_judge_file(inspector, "x", photo.data, photo.size, &plain) == GONOGO_GO);
+        EXPECT(gonogo_judge_pixels(inspector, "x", &image, &again) == GONOGO_GO);
+        EXPECT(strcmp(plain.data, again.data) == 0 && strncmp(text.data, plain.data, plain.size - 1) == 0);
+        expect_text(&text, "\"decoded\":true");
+        gonogo_text_free(&plain);
+        gonogo_text_free(&again);
+        free(grey);
+    }
+
     /* The same calibration as the command line's, byte for byte. */
     EXPECT(gonogo_calibrate(model.data, model.size, photo.data, photo.size, &text) == GONOGO_OK);
     EXPECT(text.size == calibration.size && memcmp(text.data, calibration.data, text.size) == 0);

@@ -41,6 +41,37 @@ fn a_photo_that_cannot_be_read_has_all_keys_too() {
 }
 
 #[test]
+fn in_full_the_line_goes_on_with_boxes_and_scores() {
+    let mut outcome = faulty();
+    outcome.verdict.outline = Some([[1.0, 2.0], [3.0, 2.0], [3.0, 4.04], [1.0, f64::NAN]]);
+    outcome.verdict.nodes.push(NodeReport {
+        name: "pin[2] \"x\"".into(),
+        level: 1,
+        parent: None,
+        outline: [[0.0; 2]; 4],
+        score: -0.1234567,
+        against: Vec::new(),
+        best_fault: "missing".into(),
+        inside: 1.0,
+        strangeness: 0.0,
+        faulty: true,
+        explained: false,
+    });
+    let (line, full) = (outcome.json(), outcome.json_in_full(true));
+    assert!(full.starts_with(&line[..line.len() - 1]), "{full}");
+    let read: serde_json::Value = serde_json::from_str(&full).unwrap();
+    assert_eq!(read["decoded"], true);
+    assert_eq!(read["outline"], serde_json::json!([[1.0, 2.0], [3.0, 2.0], [3.0, 4.0], [1.0, null]]));
+    let node = serde_json::json!({
+        "node": "pin[2] \"x\"", "level": 1, "faulty": true, "explained": false, "fault": "missing", "score": -0.123457,
+        "outline": [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]],
+    });
+    assert_eq!(read["nodes"], serde_json::json!([node]));
+    let unread = Outcome::unreadable("x".into(), "no".into()).json_in_full(false);
+    assert!(unread.ends_with(r#","decoded":false,"locator_score":0.0,"outline":null,"nodes":[]}"#), "{unread}");
+}
+
+#[test]
 fn without_a_clock_the_time_is_null() {
     let outcome = Outcome { milliseconds: None, ..Outcome::unreadable(String::new(), String::new()) };
     assert!(outcome.json().ends_with(r#""milliseconds":null}"#));
