@@ -53,6 +53,7 @@ fn in_full_the_line_goes_on_with_boxes_and_scores() {
         against: Vec::new(),
         best_fault: "missing".into(),
         inside: 1.0,
+        unlike: Default::default(),
         strangeness: 0.0,
         faulty: true,
         explained: false,
