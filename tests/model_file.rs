@@ -49,7 +49,7 @@ fn read(text: &str, name: &str, tables: &Tables) -> Result<Value, String> {
     let value = ron_value::parse(opened(text)?)?;
     check(&value, name, tables, name)?;
     match value.at("format") {
-        Value::Int(3) => Ok(value),
+        Value::Int(4) => Ok(value),
         other => Err(format!("format {other:?}")),
     }
 }

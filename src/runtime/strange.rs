@@ -10,6 +10,7 @@
 
 use super::inspect::NodeReport;
 use super::linear;
+use super::math;
 use super::model::{Node, SCALES};
 
 /// Mean surprise in the least likely square of each size.
@@ -20,6 +21,10 @@ const LIMIT: f64 = 3.5;
 /// No square is strange whose coefficients lie, in the mean, nearer to what is expected than this (the surprise of one that
 /// is 1.4 standard deviations off).
 const LEAST: f64 = 1.0;
+/// Unlikeness of a square in which every coefficient is three standard deviations off (Student's t, five degrees).
+const FAR: f64 = 3.09;
+/// Weight of the middle unlikeness of the photo's other nodes in what one may have.
+const COMMON: f64 = 2.0;
 /// Renders of one node scatter by at least this factor's logarithm: a few dozen do not show all that photos do.
 const LEAST_DEVIATION: f64 = 0.25;
 /// Share of a normal variable below one standard deviation above its mean.
@@ -62,7 +67,7 @@ pub fn usual(photos: &[(Vec<Unlikeness>, &[Option<Unlikeness>])]) -> Vec<Vec<[f6
 }
 
 fn log(unlikeness: f64) -> f64 {
-    unlikeness.max(FAINTEST).ln()
+    math::ln(unlikeness.max(FAINTEST))
 }
 
 /// By how much the logarithm of what each node shows exceeds what it may show: its own usual, and more by as much as the middle
@@ -94,6 +99,17 @@ pub fn weigh(nodes: &mut [NodeReport], of: &[Node], calibrated: &[Option<Unliken
             nodes[i].strangeness = nodes[i].strangeness.max(beyond[i] / (usual[i][scale][1] * of_middle(nodes.len())));
         }
     }
+    for (i, node) in nodes.iter_mut().enumerate() {
+        node.strangeness = node.strangeness.max(LIMIT * far(&unlike, i));
+    }
+}
+
+/// Renders of few draws leave much room for what they have not shown; but no square of a correct assembly is far from all that
+/// was rendered, unless the whole photo is: how far it is of what decides (1 at the limit). A lone node has nothing to be
+/// held against.
+fn far(unlike: &[Unlikeness], node: usize) -> f64 {
+    let mut others: Vec<f32> = (0..unlike.len()).filter(|&k| k != node).map(|k| unlike[k][0] as f32).collect();
+    if others.is_empty() { 0.0 } else { unlike[node][0] / (FAR + COMMON * f64::from(linear::median(&mut others))) }
 }
 
 /// What the scatter of the other nodes' median adds to a deviation from it: its variance is π/2 of the mean's.
@@ -140,6 +156,13 @@ mod tests {
     fn what_a_node_showed_at_calibration_is_not_strange() {
         let known = strangeness(&[1.0, 1.1, 4.0, 0.9, 1.0], &[1.0, 1.0, 3.5, 1.0, 1.0]);
         assert!(known.iter().all(|s| *s < 1.0), "{known:?}");
+    }
+
+    #[test]
+    fn a_node_far_from_all_renders_is_strange_whatever_they_leave_open() {
+        let limit = |node: f64, others: f64| far(&[[node; SCALES], [others; SCALES]], 0);
+        assert!(limit(4.2, 0.5) > 1.0 && limit(4.0, 0.5) < 1.0 && limit(4.2, 1.0) < 1.0);
+        assert_eq!(far(&[[9.0; SCALES]], 0), 0.0);
     }
 
     #[test]
