@@ -31,6 +31,8 @@ fn a_proof_counts_every_good_and_every_fault() {
     for mode in &proof.rates.modes {
         assert_eq!(mode.escape.trials, 4, "{} {}", mode.component, mode.fault);
     }
+    let rejected = proof.rates.false_reject.events;
+    assert!(proof.blamed.iter().map(|b| b.photos).sum::<u32>() >= rejected, "{:?}", proof.blamed);
     assert_eq!(proof, measure(1));
 
     let changed = |path: &str| read(path).map(|text| text.replace("z = 4 ±0.05", "z = 4 ±0.06"));

@@ -44,13 +44,13 @@ fn broken(proof: &Promise) -> bool {
     lower_95(&proof.false_reject) > proof.false_reject_asked
 }
 
-fn table(promise: &Promise, Proof { rates: proof, seen_from }: &Proof) -> Vec<String> {
+fn table(promise: &Promise, Proof { rates: proof, seen_from, blamed }: &Proof) -> Vec<String> {
     let mut lines = vec![
         format!("false rejects: asked {:.2} % at most", 100.0 * proof.false_reject_asked),
         row("", &promise.false_reject, &proof.false_reject),
-        "escapes:".into(),
-        row("all error modes", &promise.escape, &proof.escape),
     ];
+    lines.extend(blamed.iter().map(|b| format!("    {:>4} x {}", b.photos, b.reason)));
+    lines.extend(["escapes:".into(), row("all error modes", &promise.escape, &proof.escape)]);
     for (i, mode) in proof.modes.iter().enumerate() {
         let name = format!("{} {}", mode.component, mode.fault);
         // Modes stand in the same order in both: the same spec gives the same plan.
@@ -87,6 +87,7 @@ fn row(name: &str, promised: &Rate, proven: &Rate) -> String {
 mod tests {
     use super::*;
     use crate::runtime::model::ModeRate;
+    use crate::train::prove::Blamed;
     use crate::train::stats::rate;
 
     fn proof(rejected: u32) -> Promise {
@@ -103,8 +104,10 @@ mod tests {
 
     #[test]
     fn the_table_shows_both_rates_of_every_mode() {
-        let lines = table(&proof(0), &Proof { rates: proof(5), seen_from: vec![Some(1.26)] });
-        assert!(lines[4].contains("pin not seated") && lines[4].ends_with("9 in 10 from 1.3 mm on"), "{lines:?}");
+        let blamed = vec![Blamed { reason: "pin missing".into(), photos: 5 }];
+        let lines = table(&proof(0), &Proof { rates: proof(5), seen_from: vec![Some(1.26)], blamed });
+        assert_eq!(lines[2], "       5 x pin missing");
+        assert!(lines[5].contains("pin not seated") && lines[4].ends_with("9 in 10 from 1.3 mm on"), "{lines:?}");
         assert!(lines[1].contains("promised    0 of 1000") && lines[1].contains("measured    5 of 1000"), "{lines:?}");
         assert!(lines.last().is_some_and(|l| l.contains("not kept")));
     }

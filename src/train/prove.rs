@@ -10,7 +10,9 @@ use super::verify::Judged;
 use super::{Job, Observer, Step, render, shots, verify};
 use crate::assembly::fault::Motion;
 use crate::diag::Diagnostic;
+use crate::runtime::inspect::{Decision, Verdict};
 use crate::runtime::model::{Model, Promise};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How much to render.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +33,16 @@ pub struct Proof {
     /// Per error mode of the rates, the smallest size (mm) from which on at least nine in ten are found, at 95 % confidence
     /// (a90/95); `None` for modes without a size, and where no size is found so surely.
     pub seen_from: Vec<Option<f64>>,
+    /// Why good assemblies were not passed, most frequent first. A photo may have several reasons.
+    pub blamed: Vec<Blamed>,
+}
+
+/// Good assemblies that were not passed for one reason.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Blamed {
+    /// The component and its fault, or why a photo could not be inspected.
+    pub reason: String,
+    pub photos: u32,
 }
 
 /// Share of faults of a size and larger that must be found for the size to count as seen.
@@ -50,6 +62,7 @@ pub fn prove(job: &Job, model: &Model, trials: Trials, observer: &Observer) -> R
     let faults = trials.faults.div_ceil(customers).min(goods);
     let (mut judged, mut unfit) = (Vec::new(), 0);
     let mut sizes = Sizes::new(&plan);
+    let mut blamed = BTreeMap::new();
     for index in 0..customers {
         let customer = verify::customer(model, job.station, FIRST_CUSTOMER + u64::from(index));
         let camera = customer.installation.apply(&job.camera);
@@ -59,9 +72,13 @@ pub fn prove(job: &Job, model: &Model, trials: Trials, observer: &Observer) -> R
         match verify::judge(model, &plan, &customer, &shots) {
             Some(verdicts) => {
                 sizes.note(job, &plan, &shots, &verdicts);
+                verdicts.good.iter().flat_map(reasons).for_each(|r| *blamed.entry(r).or_insert(0) += 1);
                 judged.push(verdicts);
             }
-            None => unfit += 1,
+            None => {
+                unfit += 1;
+                *blamed.entry("the calibration photo was refused".into()).or_insert(0) += 1;
+            }
         }
     }
     observer(Step::Verify, 0, 1);
@@ -70,7 +87,18 @@ pub fn prove(job: &Job, model: &Model, trials: Trials, observer: &Observer) -> R
     let name = |m: &usize| &job.design.components[job.modes[*m].component].name;
     let has_node = |m: &usize| model.nodes.iter().any(|n| n.name == *name(m));
     let rows = plan.scenes.iter().flatten().zip(sizes.0).filter(|(m, _)| has_node(m));
-    Ok(Proof { rates, seen_from: rows.map(|(_, trials)| seen_from(trials)).collect() })
+    let mut blamed: Vec<Blamed> = blamed.into_iter().map(|(reason, photos)| Blamed { reason, photos }).collect();
+    blamed.sort_by_key(|b| std::cmp::Reverse(b.photos));
+    Ok(Proof { rates, seen_from: rows.map(|(_, trials)| seen_from(trials)).collect(), blamed })
+}
+
+/// Why a photo was not passed.
+fn reasons(verdict: &Verdict) -> BTreeSet<String> {
+    match verdict.decision {
+        Decision::Go => BTreeSet::new(),
+        Decision::NoGo => verdict.findings.iter().map(|f| format!("{} {}", f.component, f.fault)).collect(),
+        Decision::CannotInspect => [verdict.reason.clone()].into(),
+    }
 }
 
 /// Per mode of every scene, in the order of the rates: the sizes rendered (mm) and whether the component was blamed.
