@@ -15,7 +15,7 @@
 
 #![cfg(feature = "compile")]
 
-use gonogo::design::model::{Grooves, Lay, MaterialKind};
+use gonogo::design::model::{Colour, Grooves, Lay, MaterialKind};
 use gonogo::render::{Settings, render};
 use gonogo::runtime::camera::Camera;
 use gonogo::scene::{Body, Emitter, Finish, Ground, Lamp, Scene};
@@ -299,7 +299,7 @@ impl Light {
                 Emitter::Sky { sin_low: 0.0, sin_high: 1.0, azimuth_low: 0.0, azimuth_high: TAU }
             }
         };
-        Lamp { name: format!("lamp {group}"), emitter, group }
+        Lamp { name: format!("lamp {group}"), emitter, group, colour: Colour::White }
     }
 }
 

@@ -2,9 +2,10 @@
 
 #![cfg(feature = "compile")]
 
-use gonogo::design::model::{Corner, Design, Expr, LightShape, Sense, Shape};
+use gonogo::design::model::{Colour, Corner, Design, Expr, LightShape, Sense, Shape};
 use gonogo::design::{Loaded, load};
 use gonogo::solid::Quality;
+use std::collections::BTreeMap;
 
 fn read(path: &str) -> std::io::Result<String> {
     std::fs::read_to_string(path)
@@ -154,6 +155,26 @@ fn a_setting_overrides_a_let_and_the_digest_knows_it() {
     assert!((dim(larger.design.as_ref().unwrap(), "plate.bore[1].d").mmc - 8.0).abs() < 1e-12);
     assert_ne!(larger.text, loaded(path).text);
     assert_eq!(larger.inputs, [path]);
+}
+
+/// A metal with a name has the index of the light that falls on it; one with numbers of its own keeps them.
+#[test]
+fn metals_know_the_colours_that_shine_on_them() {
+    let wheel = read("specs/pattern_wheel.gng").unwrap();
+    let tints = |ring: &str, brass: &str| -> BTreeMap<String, Vec<(Colour, f64)>> {
+        let text = wheel.replacen("= ring(", ring, 1).replacen("= brass\n", brass, 1);
+        let loaded = load("lit.gng", &|_| Ok(text.clone()), &[]);
+        assert!(loaded.diagnostics.is_empty(), "{:#?}", loaded.diagnostics);
+        let materials = loaded.design.unwrap().materials.into_iter();
+        materials.map(|m| (m.name, m.tints.iter().map(|t| (t.colour, t.n)).collect())).collect()
+    };
+    assert!(tints("= ring(", "= brass\n").values().all(Vec::is_empty), "white light needs none");
+    let blue = tints("= ring(colour = blue, ", "= brass\n");
+    assert_eq!(blue["brass"], [(Colour::Blue, 1.09)]);
+    assert_eq!(blue["machined_steel"], [(Colour::Blue, 1.68)]);
+    assert_eq!(blue["dark_plate"], [], "no metal");
+    let own = tints("= ring(colour = blue, ", "= brass\n    n = 1.2\n");
+    assert_eq!(own["brass"], []);
 }
 
 #[test]

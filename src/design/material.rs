@@ -1,17 +1,31 @@
 //! `material`: how a surface answers light.
 
 use super::fields::Fields;
-use super::model::{Grooves, Lay, Material, MaterialKind};
+use super::model::{Colour, Grooves, Lay, Material, MaterialKind, Tint};
 use super::scope::Resolver;
 use crate::diag::Diagnostic;
 use crate::syntax::ast::{Body, Name, Value};
 use crate::units::{Quantity, Range};
 
-/// Complex refractive indices near 0.6 µm, where white light and a monochrome sensor have their weight. Rounded from
-/// refractiveindex.info (CC0): steel from Karlsson (austenitic stainless), aluminium from Mathewson, brass from Querry
-/// (Cu70Zn30), copper from Querry.
-const METALS: [(&str, [f64; 2]); 4] =
-    [("steel", [2.4, 4.1]), ("aluminium", [1.4, 7.4]), ("brass", [0.45, 3.6]), ("copper", [0.32, 3.3])];
+/// Complex refractive indices. Rounded from refractiveindex.info (CC0): steel from Karlsson (austenitic stainless), aluminium
+/// from Mathewson and in blue, where that ends, from Rakić; brass from Querry (Cu70Zn30), copper from Querry.
+const METALS: [(&str, Metal); 4] = [
+    ("steel", Metal { white: [2.4, 4.1], led: [[1.68, 3.12], [1.97, 3.56], [2.33, 4.07], [3.25, 4.91]] }),
+    ("aluminium", Metal { white: [1.4, 7.4], led: [[0.63, 5.45], [0.90, 6.26], [1.44, 7.26], [2.60, 7.64]] }),
+    ("brass", Metal { white: [0.45, 3.6], led: [[1.09, 1.83], [0.57, 2.57], [0.45, 3.48], [0.49, 5.27]] }),
+    ("copper", Metal { white: [0.32, 3.3], led: [[1.17, 2.04], [1.00, 2.24], [0.32, 3.14], [0.42, 4.98]] }),
+];
+
+/// The colours of the columns of [`Metal::led`].
+const LEDS: [Colour; 4] = [Colour::Blue, Colour::Green, Colour::Red, Colour::Infrared];
+
+/// Refractive index n and extinction k of a metal.
+#[derive(Clone, Copy)]
+struct Metal {
+    /// Near 0.6 µm, where white light and a monochrome sensor have their weight.
+    white: [f64; 2],
+    led: [[f64; 2]; 4],
+}
 
 /// Index of the clear coat of a plastic.
 const COAT: [f64; 2] = [1.5, 0.0];
@@ -46,16 +60,18 @@ impl Resolver {
         let kinds = [("metal", MaterialKind::Metal), ("plastic", MaterialKind::Plastic), ("matt", MaterialKind::Matt)];
         let implied = if fields.get("metal").is_some() { MaterialKind::Metal } else { MaterialKind::Matt };
         let kind = self.word_or(&fields, "kind", &kinds, implied);
-        let index = match kind {
-            MaterialKind::Metal => self.word_or(&fields, "metal", &METALS, METALS[0].1),
-            _ => COAT,
-        };
+        let metal = (kind == MaterialKind::Metal).then(|| self.word_or(&fields, "metal", &METALS, METALS[0].1));
+        let index = metal.map_or(COAT, |m| m.white);
+        // Who gives numbers of his own has measured them under his own light.
+        let own = fields.get("n").is_some() || fields.get("k").is_some();
+        let led = metal.filter(|_| !own).map(|m| m.led).into_iter().flatten();
         let (reflectance, roughness) = usual(kind);
         Material {
             name: name.text.clone(),
             kind,
             n: self.exact_or(&fields, "n", Quantity::Ratio, index[0], [0.01, 10.0]),
             k: self.exact_or(&fields, "k", Quantity::Ratio, index[1], [0.0, 20.0]),
+            tints: LEDS.into_iter().zip(led).map(|(colour, [n, k])| Tint { colour, n, k }).collect(),
             reflectance: self.range_within(&fields, "reflectance", Quantity::Ratio, reflectance, [0.0, 1.0]),
             roughness: self.range_within(&fields, "roughness", Quantity::Ratio, roughness, [0.001, 1.0]),
             edge_break: self.range_within(&fields, "edge_break", Quantity::Length, EDGE_BREAK, [0.0, 10.0]),

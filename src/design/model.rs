@@ -202,6 +202,10 @@ pub struct Material {
     /// Complex refractive index (metals), as seen by a monochrome camera under white light.
     pub n: f64,
     pub k: f64,
+    /// The same under light of the colours that the spec's stations use; left out where they use none, so that a design under
+    /// white light serialises as ever.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tints: Vec<Tint>,
     /// Share of light returned: scales the Fresnel term of a metal; albedo of the body of plastics and matt surfaces.
     pub reflectance: Range,
     /// GGX alpha (metals, coat of plastics); across the grooves where there is a lay.
@@ -217,6 +221,32 @@ pub struct Material {
     pub lay: Option<Lay>,
     #[serde(skip)]
     pub span: Span,
+}
+
+/// What a lamp's light is made of.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub enum Colour {
+    #[default]
+    White,
+    /// Light-emitting diodes of 450, 530, 625 and 850 nm.
+    Blue,
+    Green,
+    Red,
+    Infrared,
+}
+
+impl Colour {
+    pub fn is_white(&self) -> bool {
+        *self == Colour::White
+    }
+}
+
+/// Complex refractive index of a metal under light of one colour.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Tint {
+    pub colour: Colour,
+    pub n: f64,
+    pub k: f64,
 }
 
 /// A camera as installed, or as the compiler may choose it.
@@ -292,6 +322,8 @@ pub enum Response {
 pub struct LightSpec {
     pub name: String,
     pub shape: LightShape,
+    #[serde(skip_serializing_if = "Colour::is_white")]
+    pub colour: Colour,
     /// Radiance relative to the other lights; a prior, calibration replaces it.
     pub power: f64,
     /// How far the lamp drifts between photos: ± this share.

@@ -23,7 +23,7 @@ pub(super) fn resolve(resolver: &mut Resolver, trees: &[Tree], overrides: &[(ast
     for (name, call, used) in std::mem::take(&mut blocks.members) {
         blocks.parts.push((resolver.member(name, call, &families), used));
     }
-    let materials: Vec<Material> =
+    let mut materials: Vec<Material> =
         blocks.materials.iter().map(|(name, body, _)| resolver.material(name, body)).collect();
     let catalogue = Catalogue {
         parts: blocks.parts.iter().rev().map(|(part, _)| (part.name.text.as_str(), *part)).collect(),
@@ -39,6 +39,8 @@ pub(super) fn resolve(resolver: &mut Resolver, trees: &[Tree], overrides: &[(ast
     resolver.senses(&built.parts);
     resolver.settle_readings();
     let stations = resolver.stations(&blocks, &catalogue);
+    let shines = |colour| stations.iter().flat_map(|s| &s.lights).any(|l| l.colour == colour);
+    materials.iter_mut().for_each(|m| m.tints.retain(|t| shines(t.colour)));
     let inspect = resolver.inspect(blocks.inspect.map(|(_, body, span)| (body, span)), &built);
     let train = resolver.train(blocks.train);
     resolver.check_inspect_name(&blocks);

@@ -4,7 +4,7 @@
 //! [`Station`] a camera, `line.top` and `line.side`, which share all but the camera.
 
 use super::fields::Fields;
-use super::model::{CameraPlacing, CameraSpec, Floor, LightShape, LightSpec, PerPhoto, Response, Station};
+use super::model::{CameraPlacing, CameraSpec, Colour, Floor, LightShape, LightSpec, PerPhoto, Response, Station};
 use super::scope::Resolver;
 use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{Body, Call, Name, Stmt, Value};
@@ -306,7 +306,7 @@ impl Resolver {
             "ring" => self.ring(&fields),
             "panel" | "bar" => self.panel(&fields),
             "room" => {
-                self.check_fields(&fields, &["patches", "power"]);
+                self.check_fields(&fields, &["patches", "power", "colour"]);
                 LightShape::Room { patches: self.whole_or(&fields, "patches", 9, [1, 64]) as u32 }
             }
             other => {
@@ -318,11 +318,19 @@ impl Resolver {
         };
         let power = self.range_within(&fields, "power", Quantity::Ratio, Range::symmetric(1.0, DRIFT), [0.0, f64::MAX]);
         let drift = if power.nominal > 0.0 { power.half_width() / power.nominal } else { 0.0 };
-        Some(LightSpec { name: name.text.clone(), shape, power: power.nominal, drift, span: name.span })
+        let colours = [
+            ("white", Colour::White),
+            ("blue", Colour::Blue),
+            ("green", Colour::Green),
+            ("red", Colour::Red),
+            ("infrared", Colour::Infrared),
+        ];
+        let colour = self.word_or(&fields, "colour", &colours, Colour::White);
+        Some(LightSpec { name: name.text.clone(), shape, colour, power: power.nominal, drift, span: name.span })
     }
 
     fn ring(&mut self, fields: &Fields) -> LightShape {
-        self.check_fields(fields, &["inner", "outer", "setback", "power"]);
+        self.check_fields(fields, &["inner", "outer", "setback", "power", "colour"]);
         let inner = self.exact_or(fields, "inner", Quantity::Length, 30.0, [0.0, f64::MAX]);
         let outer = self.exact_or(fields, "outer", Quantity::Length, inner + 20.0, POSITIVE);
         if outer <= inner {
@@ -334,7 +342,7 @@ impl Resolver {
     }
 
     fn panel(&mut self, fields: &Fields) -> LightShape {
-        self.check_fields(fields, &["width", "height", "at", "aim", "power"]);
+        self.check_fields(fields, &["width", "height", "at", "aim", "power", "colour"]);
         for (key, example) in [("width", "100"), ("height", "100"), ("at", "(0, -100, 300)")] {
             if fields.get(key).is_none() {
                 self.missing(fields, key, example);

@@ -83,6 +83,11 @@ const BORE: Argument = arg("d", Length, "diameter");
 const HEIGHT: Argument = arg("h", Depth, "height, from z = 0 up");
 const DEEP: Argument = arg("h", Depth, "depth below the face z = 0");
 const POWER: Argument = arg("power", Ratio, "radiance beside the other lights, and its drift between photos; 1 ±10 %");
+const COLOUR: Argument = arg(
+    "colour",
+    OneOf(&["white", "blue", "green", "red", "infrared"]),
+    "of the light: metals answer each in their own way; white",
+);
 const AIM: Argument = arg("aim", Point, "the point it is turned to; (0, 0, 0)");
 
 /// All that takes arguments or fields.
@@ -200,6 +205,7 @@ pub const OWNERS: &[Owner] = &[
             arg("outer", Length, "outer radius; inner + 20 mm"),
             arg("setback", Length, "distance behind the front of the lens; 0"),
             POWER,
+            COLOUR,
         ],
     },
     Owner { name: "panel", role: Role::Light, doc: "a flat panel", arguments: PANEL },
@@ -208,7 +214,11 @@ pub const OWNERS: &[Owner] = &[
         name: "room",
         role: Role::Light,
         doc: "light from the whole upper hemisphere",
-        arguments: &[arg("patches", Whole, "patches of equal solid angle, each with a power of its own; 9"), POWER],
+        arguments: &[
+            arg("patches", Whole, "patches of equal solid angle, each with a power of its own; 9"),
+            POWER,
+            COLOUR,
+        ],
     },
     Owner {
         name: "material",

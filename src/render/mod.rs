@@ -18,11 +18,13 @@ mod world;
 #[cfg(test)]
 mod tests;
 
+use crate::design::model::Colour;
 use crate::rng::Stream;
 use crate::runtime::camera::Camera;
 use crate::scene::Scene;
 use accel::Ray;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use trace::{Dice, Strategy, Tracer};
 use vector::Vec3;
 use world::World;
@@ -96,8 +98,23 @@ pub fn render(scene: &Scene, camera: &Camera, settings: &Settings) -> LightImage
     render_with(scene, camera, settings, Strategy::Both)
 }
 
+/// Surfaces answer light of every colour in their own way, so each colour has a pass of its own. All lamps stand in all of
+/// them, because they hide what is behind them.
 fn render_with(scene: &Scene, camera: &Camera, settings: &Settings, strategy: Strategy) -> LightImages {
-    let world = World::new(scene);
+    let colours: BTreeSet<Colour> = scene.lamps.iter().map(|lamp| lamp.colour).collect();
+    let mut passes = colours.iter().map(|&colour| (colour, pass(scene, colour, camera, settings, strategy)));
+    let Some((_, mut images)) = passes.next() else { return pass(scene, Colour::White, camera, settings, strategy) };
+    for (colour, mut of_colour) in passes {
+        for lamp in scene.lamps.iter().filter(|lamp| lamp.colour == colour) {
+            images.groups[lamp.group] = std::mem::take(&mut of_colour.groups[lamp.group]);
+        }
+    }
+    images
+}
+
+/// All surfaces as they are under light of one colour.
+fn pass(scene: &Scene, colour: Colour, camera: &Camera, settings: &Settings, strategy: Strategy) -> LightImages {
+    let world = World::new(scene, colour);
     let tracer = Tracer::new(&world, settings, strategy);
     let film = Film { camera, settings, tracer, groups: scene.groups, crop: inside(settings.crop, camera.size) };
     let [_, y0, _, y1] = film.crop;

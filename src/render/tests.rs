@@ -4,7 +4,7 @@ mod rays;
 
 use super::bsdf::Bsdf;
 use super::*;
-use crate::design::model::{Grooves, Lay, MaterialKind};
+use crate::design::model::{Colour, Grooves, Lay, MaterialKind, Tint};
 use crate::scene::{Body, Emitter, Finish, Ground, Lamp};
 use crate::solid::TriMesh;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -14,7 +14,19 @@ use std::sync::Arc;
 fn finish(kind: MaterialKind, reflectance: f64, roughness: f64) -> Finish {
     let mottle_size = [5.0; 3];
     let [n, k, mottle, edge_break] = [0.0, 1.0, 0.0, 0.0];
-    Finish { kind, n, k, reflectance, roughness, mottle, mottle_size, mottle_seed: 1, edge_break, lay: None }
+    Finish {
+        kind,
+        n,
+        k,
+        tints: Vec::new(),
+        reflectance,
+        roughness,
+        mottle,
+        mottle_size,
+        mottle_seed: 1,
+        edge_break,
+        lay: None,
+    }
 }
 
 fn ground(finish: Finish) -> Option<Ground> {
@@ -28,7 +40,7 @@ fn facing(at: [f64; 3], up: bool) -> Isometry3<f64> {
 }
 
 fn lamp(emitter: Emitter, group: usize) -> Lamp {
-    Lamp { name: format!("lamp {group}"), emitter, group }
+    Lamp { name: format!("lamp {group}"), emitter, group, colour: Colour::White }
 }
 
 fn whole_sky(group: usize) -> Lamp {
@@ -143,6 +155,29 @@ fn a_white_world_under_a_white_sky_is_white() {
     assert!((mean(&image.groups[0]) - 1.0).abs() < 1e-3, "{}", mean(&image.groups[0]));
     let (mean, error) = replicated(&scene, &small_camera(), &Settings::exact(32, 64), Strategy::Both)[0];
     assert!((mean - 1.0).abs() < 4.0 * error + 1e-3, "{mean} ± {error}");
+}
+
+/// Brass is dark in blue light. Two skies of different colours over it: each image is what that colour's index alone gives.
+#[test]
+fn each_colour_of_light_meets_its_own_index() {
+    let brass = [(Colour::Blue, 1.09, 1.83), (Colour::Red, 0.45, 3.48)];
+    let tints = brass.map(|(colour, n, k)| Tint { colour, n, k }).to_vec();
+    let scene = |finish: Finish, colours: &[Colour]| Scene {
+        bodies: vec![body(cylinder(6.0, 12.0, 48), [0.0, 0.0, 8.0], finish.clone())],
+        ground: ground(finish),
+        lamps: (0..).zip(colours).map(|(group, &colour)| Lamp { colour, ..whole_sky(group) }).collect(),
+        groups: colours.len(),
+    };
+    let metal = finish(MaterialKind::Metal, 1.0, 0.3);
+    let settings = Settings::exact(4, 3);
+    let both = scene(Finish { tints, ..metal.clone() }, &[Colour::Red, Colour::Blue, Colour::White]);
+    let both = render(&both, &small_camera(), &settings);
+    for (group, n, k) in [(0, 0.45, 3.48), (1, 1.09, 1.83), (2, metal.n, metal.k)] {
+        let mut alone = scene(Finish { n, k, ..metal.clone() }, &[Colour::White; 3]);
+        alone.lamps.iter_mut().for_each(|lamp| lamp.colour = Colour::White);
+        assert_eq!(render(&alone, &small_camera(), &settings).groups[group], both.groups[group], "{group}");
+    }
+    assert!(mean(&both.groups[1]) < 0.6 * mean(&both.groups[0]), "brass is dark in blue light");
 }
 
 #[test]

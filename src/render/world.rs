@@ -9,7 +9,7 @@ use super::edge_break::{Beyond, passes, rounded, sides};
 use super::lamp::{FlatLamp, LampHit, Sky};
 use super::mottle::blotches;
 use super::vector::Vec3;
-use crate::design::model::{Grooves, Lay, MaterialKind};
+use crate::design::model::{Colour, Grooves, Lay, MaterialKind};
 use crate::scene::{Axis, Body, Finish, Ground, Scene};
 use nalgebra::Matrix3;
 
@@ -79,7 +79,8 @@ impl Spot {
 }
 
 impl World {
-    pub fn new(scene: &Scene) -> World {
+    /// Surfaces are as they are under light of one colour.
+    pub fn new(scene: &Scene, colour: Colour) -> World {
         let (mut corners, mut triangles) = (Vec::new(), Vec::new());
         for (skin, body) in scene.bodies.iter().enumerate() {
             add_body(body, skin as u32, &mut corners, &mut triangles);
@@ -89,8 +90,8 @@ impl World {
             middle: middle(&corners).or(scene.ground.as_ref().map(|g| g.origin.coords.cast())).unwrap_or_default(),
             corners,
             triangles,
-            skins: scene.bodies.iter().map(Skin::of_body).collect(),
-            ground: scene.ground.as_ref().map(Plane::new),
+            skins: scene.bodies.iter().map(|body| Skin::of_body(body, colour)).collect(),
+            ground: scene.ground.as_ref().map(|ground| Plane::new(ground, colour)),
             lamps: scene.lamps.iter().filter_map(FlatLamp::new).collect(),
             sky: Sky::new(&scene.lamps),
         }
@@ -202,9 +203,9 @@ fn middle(corners: &[Corners]) -> Option<Vec3> {
 }
 
 impl Plane {
-    fn new(ground: &Ground) -> Plane {
+    fn new(ground: &Ground, colour: Colour) -> Plane {
         let origin = ground.origin.coords.cast();
-        Plane { z: ground.z as f32, skin: Skin::new(&ground.finish, Matrix3::identity(), origin, &[]) }
+        Plane { z: ground.z as f32, skin: Skin::new(&ground.finish, colour, Matrix3::identity(), origin, &[]) }
     }
 
     /// Where a ray meets the plane from above.
@@ -267,18 +268,20 @@ impl Lines {
 }
 
 impl Skin {
-    fn of_body(body: &Body) -> Skin {
+    fn of_body(body: &Body, colour: Colour) -> Skin {
         let to_part = body.pose.rotation.to_rotation_matrix().into_inner().transpose().cast();
-        Skin::new(&body.finish, to_part, body.pose.translation.vector.cast(), &body.axes)
+        Skin::new(&body.finish, colour, to_part, body.pose.translation.vector.cast(), &body.axes)
     }
 
-    fn new(finish: &Finish, to_part: Matrix3<f32>, origin: Vec3, axes: &[Axis]) -> Skin {
+    fn new(finish: &Finish, colour: Colour, to_part: Matrix3<f32>, origin: Vec3, axes: &[Axis]) -> Skin {
         // A size of 0 would be noise without end: blotches smaller than a micrometre do not show.
         let scale = Vec3::from(finish.mottle_size.map(|s| 1.0 / s.abs().max(1e-3) as f32));
+        let tint = finish.tints.iter().find(|t| t.colour == colour);
+        let [n, k] = tint.map_or([finish.n, finish.k], |t| [t.n, t.k]);
         Skin {
             kind: finish.kind,
-            n: finish.n as f32,
-            k: finish.k as f32,
+            n: n as f32,
+            k: k as f32,
             reflectance: finish.reflectance as f32,
             roughness: finish.roughness as f32,
             edge_break: finish.edge_break as f32,

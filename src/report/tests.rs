@@ -40,6 +40,7 @@ fn steel() -> Material {
         kind: MaterialKind::Metal,
         n: 2.4,
         k: 4.1,
+        tints: Vec::new(),
         reflectance: exactly(1.0),
         roughness: exactly(0.2),
         edge_break: exactly(0.1),

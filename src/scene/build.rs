@@ -66,7 +66,9 @@ pub fn camera(spec: &CameraSpec, placing: Placed) -> Camera {
 /// A ring light rides on the camera, so it is the camera as installed that must be given.
 pub fn lamps(station: &Station, camera: &Camera) -> Vec<Lamp> {
     let named = station.lights.iter().flat_map(|light| emitters(light, camera));
-    named.enumerate().map(|(group, (name, emitter))| Lamp { name, emitter, group }).collect()
+    let lights = light_of_group(station);
+    let lamp = |(group, (name, emitter))| Lamp { name, emitter, group, colour: station.lights[lights[group]].colour };
+    named.enumerate().map(lamp).collect()
 }
 
 /// For every light group of [`lamps`], the light of the station (index) it belongs to: whose power and drift it shares.
@@ -96,6 +98,7 @@ pub fn finish_nominal(material: &Material) -> Finish {
         kind: material.kind,
         n: material.n,
         k: material.k,
+        tints: material.tints.clone(),
         reflectance: material.reflectance.nominal,
         roughness: material.roughness.nominal,
         edge_break: material.edge_break.nominal,
@@ -224,7 +227,7 @@ fn log_uniform(range: &Range, u: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::model::{CameraPlacing, MaterialKind, PerPhoto, Response};
+    use crate::design::model::{CameraPlacing, Colour, MaterialKind, PerPhoto, Response};
     use crate::diag::Span;
 
     fn spec() -> CameraSpec {
@@ -248,7 +251,14 @@ mod tests {
     }
 
     fn station(shapes: Vec<LightShape>) -> Station {
-        let light = |shape| LightSpec { name: "lamp".into(), shape, power: 1.0, drift: 0.15, span: Span::default() };
+        let light = |shape| LightSpec {
+            name: "lamp".into(),
+            shape,
+            colour: Colour::White,
+            power: 1.0,
+            drift: 0.15,
+            span: Span::default(),
+        };
         Station {
             name: "S".into(),
             camera: spec(),
@@ -270,6 +280,7 @@ mod tests {
             kind: MaterialKind::Metal,
             n: 2.4,
             k: 4.1,
+            tints: Vec::new(),
             reflectance: Range { low: 0.4, nominal: 0.6, high: 0.9 },
             roughness: Range { low: 0.05, nominal: 0.1, high: 0.2 },
             edge_break: Range::exactly(0.0),

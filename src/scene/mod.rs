@@ -5,7 +5,7 @@
 pub mod build;
 mod turning;
 
-use crate::design::model::{Lay, MaterialKind};
+use crate::design::model::{Colour, Lay, MaterialKind, Tint};
 use crate::solid::TriMesh;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
@@ -16,6 +16,8 @@ pub struct Finish {
     pub kind: MaterialKind,
     pub n: f64,
     pub k: f64,
+    /// Index under coloured light; `n` and `k` under the colours that are not listed.
+    pub tints: Vec<Tint>,
     pub reflectance: f64,
     pub roughness: f64,
     /// Width of the rounding of convex edges on each face (mm).
@@ -66,6 +68,7 @@ pub struct Lamp {
     pub emitter: Emitter,
     /// Light group: images are returned one per group.
     pub group: usize,
+    pub colour: Colour,
 }
 
 /// An endless horizontal plane.

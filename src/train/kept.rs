@@ -11,11 +11,29 @@ use crate::assembly::fault::ErrorMode;
 use crate::cache::bytes::{Reader, Writer};
 use crate::cache::{Cache, Key};
 use crate::design::essence::{essence, is_exact};
-use crate::design::model::{Design, LightShape};
+use crate::design::model::{Colour, Design, LightShape, LightSpec};
 use crate::runtime::camera::Camera;
 use crate::runtime::grid::Grid;
 use crate::runtime::pose::Pose;
 use crate::variation;
+use serde::Serialize;
+
+/// What an image knows of a light.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Shining<'a> {
+    White(&'a LightShape),
+    Coloured(&'a LightShape, Colour),
+}
+
+impl Shining<'_> {
+    fn of(light: &LightSpec) -> Shining<'_> {
+        match light.colour {
+            Colour::White => Shining::White(&light.shape),
+            colour => Shining::Coloured(&light.shape, colour),
+        }
+    }
+}
 
 /// The draws that one camera takes.
 pub struct Kept<'a> {
@@ -37,14 +55,14 @@ impl<'a> Kept<'a> {
         let mut design = essence(job.design);
         design.dims.clear();
         design.inspect.watch.clear();
-        let shapes: Vec<&LightShape> = station.lights.iter().map(|light| &light.shape).collect();
+        let lights: Vec<Shining> = station.lights.iter().map(Shining::of).collect();
         let ranges = [station.x, station.y, station.z, station.rz];
         let taken = (&setup.camera, camera, setup.samples, setup.base, &station.camera.blur);
         Kept {
             cache: job.cache,
             design: job.design,
             modes: job.modes,
-            common: Key::new("shots", &(design, shapes, &station.floor, ranges, taken)),
+            common: Key::new("shots", &(design, lights, &station.floor, ranges, taken)),
             size: setup.camera.size.map(|s| s as usize),
             lamps: setup.lamps.len(),
         }

@@ -171,11 +171,18 @@ pub(super) fn exposure(grey: &[f64]) -> f64 {
 mod tests {
     use super::super::shapes::{block, body, overhead, placed};
     use super::*;
-    use crate::design::model::{LightShape, LightSpec};
+    use crate::design::model::{Colour, LightShape, LightSpec};
     use crate::diag::Span;
 
     fn lit_by(shape: LightShape) -> Vec<LightSpec> {
-        vec![LightSpec { name: "lamp".into(), shape, power: 1.0, drift: 0.0, span: Span::default() }]
+        vec![LightSpec {
+            name: "lamp".into(),
+            shape,
+            colour: Colour::White,
+            power: 1.0,
+            drift: 0.0,
+            span: Span::default(),
+        }]
     }
 
     /// A cube under an even sky: its top is a white-furnace surface and returns its reflectance times the sky.

@@ -3,7 +3,7 @@
 use super::super::shapes::{block, body, placed};
 use super::*;
 use crate::design::model::{
-    CameraSpec, Component, Floor, Inspect, LightShape, LightSpec, PerPhoto, PoseExpr, Response, Train, Watch,
+    CameraSpec, Colour, Component, Floor, Inspect, LightShape, LightSpec, PerPhoto, PoseExpr, Response, Train, Watch,
 };
 use crate::diag::Span;
 
@@ -140,7 +140,14 @@ fn cameras_and_lamps_inside_of_parts_or_below_the_floor_are_errors() {
         let elevation = 90f64.to_radians();
         let mut station = station(CameraPlacing::Fixed { distance, elevation, azimuth: 0.0 });
         let shape = LightShape::Panel { width: 100.0, height: 100.0, at: lamp, aim: [0.0; 3] };
-        station.lights.push(LightSpec { name: "top".into(), shape, power: 1.0, drift: 0.1, span: Span::default() });
+        station.lights.push(LightSpec {
+            name: "top".into(),
+            shape,
+            colour: Colour::White,
+            power: 1.0,
+            drift: 0.1,
+            span: Span::default(),
+        });
         station.floor = Some(Floor { z: -5.0, material: 0 });
         let choice = choose(&design(3, &[2]), &station, &niche(), &[]);
         choice.diagnostics.iter().map(|d| format!("{} {}", d.code, d.message)).collect()
