@@ -203,6 +203,7 @@ impl Patch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::model::Colour;
     use crate::rng::Stream;
 
     fn patches(rows: usize, columns: usize) -> Vec<Lamp> {
@@ -219,6 +220,7 @@ mod tests {
                     azimuth_high: (column + 1.0) * width,
                 },
                 group: i,
+                colour: Colour::White,
             });
         }
         lamps
@@ -256,7 +258,7 @@ mod tests {
             [Emitter::Ring { frame, inner: 20.0, outer: 40.0 }, Emitter::Panel { frame, width: 30.0, height: 60.0 }];
         let mut s = Stream::new(2, "lamp", 0);
         for emitter in emitters {
-            let lamp = FlatLamp::new(&Lamp { name: String::new(), emitter, group: 0 }).unwrap();
+            let lamp = FlatLamp::new(&Lamp { name: String::new(), emitter, group: 0, colour: Colour::White }).unwrap();
             for _ in 0..500 {
                 let from = Vec3::new(3.0, 2.0, 1.0);
                 let towards = lamp.sample(from, [s.uniform() as f32, s.uniform() as f32]).unwrap();

@@ -1,8 +1,8 @@
 //! What to render and where to look: the nodes of the object tree and the scenes that teach them.
 //!
 //! In: error modes, the nominal view. Out: a node per watched component whose errors show, with its frame and mask, and
-//! the error modes gathered into scenes. A node's mask is where the item buffer changes under any of its error modes,
-//! so what no fault of the component can touch has no say.
+//! the error modes gathered into scenes. A node's mask is where the component itself comes, goes or moves in the item buffer
+//! under any of its error modes: what no fault of it can touch has no say, and what moves with it has a node of its own.
 
 use super::shots::Drawn;
 use crate::assembly::fault::{ErrorMode, Motion};
@@ -23,8 +23,12 @@ const LOOKS: [f64; 3] = [0.05, 0.5, 0.95];
 const WIDEN: usize = 2;
 /// Fewer changed pixels than this (px of the shots) cannot be judged.
 const LEAST_PIXELS: usize = 8;
-/// A node has at most this many pixels; larger ones are taken at a coarser resolution.
+/// A component that shows in fewer changed pixels than this (px of the shots) is told by what else its faults change.
+const LEAST_OWN: usize = 100;
+/// A node has at most this many pixels in its mask, and this many times as many in its window; larger ones are taken at a
+/// coarser resolution. What shows through windows only is sparse: its mask is small in a large window.
 const MOST_NODE_PIXELS: u32 = 3000;
+const SPARSE: u32 = 4;
 /// A component disturbs a node when its own change covers this share of the node's.
 const DISTURBS: f64 = 0.3;
 /// A fault shows in another's node when its change covers this share of the node's.
@@ -48,8 +52,10 @@ pub struct NodePlan {
     pub visible: [f64; 4],
     /// Error modes that show here.
     pub modes: Vec<usize>,
-    /// Where the image changes under any of them (px of the shots).
+    /// Where the component itself changes the image under any of them (px of the shots); all that they change where that is too little.
     pub changed: Mask,
+    /// All that they change.
+    reach: Mask,
     /// Standard deviation of the node's shift along x and y of the photo (px).
     pub spread: [f64; 2],
     /// Nodes whose image this one's faults disturb.
@@ -101,6 +107,8 @@ struct Draft {
     good: ItemBuffer,
     /// Per mode, where the image changes; `None` where next to nothing does, or nobody watches.
     changes: Vec<Option<Mask>>,
+    /// The part of it in which the mode's own component shows, before or after.
+    own: Vec<Option<Mask>>,
     unseen: Vec<usize>,
 }
 
@@ -109,13 +117,15 @@ fn draft(design: &Design, camera: &Camera, nominal: &Drawn, modes: &[ErrorMode])
     let small = camera.reduced(base);
     let view = View { drawn: nominal, camera: &small, good: seen(nominal, &[], &small) };
     let watched = |component: usize| design.inspect.watch.iter().any(|w| w.component == component);
-    let mut changes: Vec<Option<Mask>> = Vec::new();
+    let (mut changes, mut own) = (Vec::new(), Vec::new());
     for mode in modes {
         let changed = watched(mode.component).then(|| view.changed(mode));
-        changes.push(changed.filter(|mask| mask.count() >= LEAST_PIXELS));
+        let (all, of_component) = changed.filter(|(all, _)| all.count() >= LEAST_PIXELS).unzip();
+        changes.push(all);
+        own.push(of_component);
     }
     let unseen = (0..modes.len()).filter(|&m| watched(modes[m].component) && changes[m].is_none()).collect();
-    Draft { base, good: view.good, changes, unseen }
+    Draft { base, good: view.good, changes, own, unseen }
 }
 
 fn finished(
@@ -124,16 +134,19 @@ fn finished(
     nominal: &Drawn,
     liaison: &Liaison,
     modes: &[ErrorMode],
-    Draft { base, good, changes, unseen }: Draft,
+    Draft { base, good, changes, own, unseen }: Draft,
     scenes: &[Vec<usize>],
 ) -> Plan {
     let small = camera.reduced(base);
     let view = View { drawn: nominal, camera: &small, good };
     let mut nodes: Vec<NodePlan> = (0..design.components.len())
         .filter_map(|component| {
-            let own: Vec<usize> =
+            let shown: Vec<usize> =
                 (0..modes.len()).filter(|&m| modes[m].component == component && changes[m].is_some()).collect();
-            node(design, camera, &view, base, component, own, &changes)
+            let all = |masks: &[Option<Mask>]| shown.iter().filter_map(|&m| masks[m].clone()).reduce(united);
+            let reach = all(&changes)?;
+            let changed = all(&own).filter(|own| own.count() >= LEAST_OWN).unwrap_or_else(|| reach.clone());
+            node(design, camera, &view, base, NodeArea { component, modes: shown, changed, reach })
         })
         .collect();
     link(&mut nodes);
@@ -169,19 +182,20 @@ struct View<'a> {
 }
 
 impl View<'_> {
-    /// Where the image changes under a mode, over its sweep.
-    fn changed(&self, mode: &ErrorMode) -> Mask {
-        let mut all = Mask {
-            width: self.good.width,
-            height: self.good.height,
-            bits: vec![false; self.good.width * self.good.height],
-        };
+    /// Where the image changes under a mode, over its sweep, and the part of it in which its component shows.
+    fn changed(&self, mode: &ErrorMode) -> (Mask, Mask) {
+        let (width, height) = (self.good.width, self.good.height);
+        let none = Mask { width, height, bits: vec![false; width * height] };
+        let (mut all, mut own) = (none.clone(), none);
+        let id = mode.component as u32 + 1;
         for u in mode.looks(&LOOKS) {
             let faulty = seen(self.drawn, &[(mode, u)], self.camera);
-            let change = change_mask(&self.good, &faulty);
-            all.bits.iter_mut().zip(change.bits).for_each(|(a, b)| *a |= b);
+            for (i, change) in change_mask(&self.good, &faulty).bits.into_iter().enumerate() {
+                all.bits[i] |= change;
+                own.bits[i] |= change && (self.good.id[i] == id || faulty.id[i] == id);
+            }
         }
-        all
+        (all, own)
     }
 }
 
@@ -207,22 +221,19 @@ fn resolution(design: &Design, camera: &Camera, nominal: &Drawn) -> u32 {
     base
 }
 
-fn node(
-    design: &Design,
-    camera: &Camera,
-    view: &View,
-    base: u32,
+/// Where a component's error modes show.
+struct NodeArea {
     component: usize,
     modes: Vec<usize>,
-    changes: &[Option<Mask>],
-) -> Option<NodePlan> {
-    let mut changed = changes[*modes.first()?].clone()?;
-    for mask in modes.iter().filter_map(|&m| changes[m].as_ref()) {
-        changed.bits.iter_mut().zip(&mask.bits).for_each(|(a, b)| *a |= b);
-    }
+    changed: Mask,
+    reach: Mask,
+}
+
+fn node(design: &Design, camera: &Camera, view: &View, base: u32, area: NodeArea) -> Option<NodePlan> {
+    let NodeArea { component, modes, changed, reach } = area;
     let wide = dilate(&changed, WIDEN);
     let area = wide.bbox()?;
-    let factor = factor(&area, base);
+    let factor = factor(&area, wide.count() as u32, base);
     let (frame, mask) = framed(&wide, &area, base, factor, plane(view, component, &changed));
     let shown = view.good.bbox(component).or_else(|| changed.bbox())?;
     let visible = [shown.x0, shown.y0, shown.x1, shown.y1].map(|v| f64::from(v * base));
@@ -234,6 +245,7 @@ fn node(
         visible,
         modes,
         changed,
+        reach,
         spread,
         disturbs: Vec::new(),
         disturbed: Vec::new(),
@@ -241,9 +253,10 @@ fn node(
 }
 
 /// px of the photo per px of the node.
-fn factor(area: &PixelBox, base: u32) -> u32 {
+fn factor(area: &PixelBox, count: u32, base: u32) -> u32 {
     let mut factor = base;
-    while (area.x1 - area.x0) * (area.y1 - area.y0) * base * base / (factor * factor) > MOST_NODE_PIXELS {
+    let window = (area.x1 - area.x0) * (area.y1 - area.y0);
+    while count.max(window / SPARSE) * base * base / (factor * factor) > MOST_NODE_PIXELS {
         factor *= 2;
     }
     factor
@@ -315,7 +328,7 @@ fn half_zone(axis: &Expr, design: &Design) -> f64 {
 /// Notes which nodes lie where another's faults change the image.
 fn link(nodes: &mut [NodePlan]) {
     let covers = |a: &NodePlan, b: &NodePlan| {
-        let common = a.changed.bits.iter().zip(&b.changed.bits).filter(|(a, b)| **a && **b).count();
+        let common = a.reach.bits.iter().zip(&b.changed.bits).filter(|(a, b)| **a && **b).count();
         common as f64 >= DISTURBS * b.changed.count() as f64
     };
     for i in 0..nodes.len() {
@@ -395,4 +408,43 @@ fn any_meet(some: &[Option<Mask>], others: &[Option<Mask>]) -> bool {
 fn united(mut one: Mask, other: Mask) -> Mask {
     one.bits.iter_mut().zip(&other.bits).for_each(|(a, b)| *a |= b);
     one
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::build::{Placed, camera};
+    use crate::train::shots;
+    use crate::{assembly, design};
+    use std::f64::consts::FRAC_PI_2;
+
+    /// A lid of 24 mm on a spacer, seen from above. What is changed at the lid's middle belongs to the lid where the spacer shows
+    /// beside it; where it is hidden, the lid's coming down is all that tells of it.
+    #[test]
+    fn a_node_is_where_its_own_component_shows_and_not_what_moves_with_it() {
+        for (spacer, shows) in [(40.0, true), (16.0, false)] {
+            let text = format!(
+                "gonogo 1\nunits mm deg\ntolerances exact\nmaterial paint {{\n kind = matt\n}}\n\
+                 part base {{\n material = paint\n add slab = box(x = 60, y = 60, z = 4)\n}}\n\
+                 part spacer {{\n material = paint\n add disc = cylinder(d = {spacer}, h = 6)\n}}\n\
+                 part lid {{\n material = paint\n add disc = cylinder(d = 24, h = 5)\n}}\n\
+                 assembly stack {{\n root base\n place spacer on base {{\n  z = 4\n }}\n place lid on spacer {{\n  z = 6\n }}\n}}\n\
+                 station bench {{\n camera fixed {{\n image = 160 x 120 px\n focal = 16\n pitch = 0.03\n distance = 400\n elevation = 80\n}}\n\
+                 light room = room()\n}}\ninspect stack {{\n watch spacer\n watch lid\n}}\n"
+            );
+            let loaded = design::load("stack.gng", &|_| Ok(text.clone()), &[]);
+            let design = loaded.design.unwrap_or_else(|| panic!("{:#?}", loaded.diagnostics));
+            let station = &design.stations[0];
+            let nominal = shots::nominal(&design, station).unwrap();
+            let (found, _) = assembly::analyse(&design, &nominal.solids);
+            let modes = assembly::fault::all(&design, &found.liaison, &found.insertion, &nominal.solids);
+            let camera = camera(&station.camera, Placed { distance: 400.0, elevation: 1.4, azimuth: -FRAC_PI_2 });
+            let plan = plan(&design, &camera, &nominal, &found.liaison, &modes);
+            let node = plan.nodes.iter().find(|n| design.components[n.component].name == "spacer").unwrap();
+            let middle = camera.reduced(plan.base).project([0.0, 0.0, 15.0]).unwrap().map(|v| v as usize);
+            let at = |mask: &Mask| mask.bits[middle[1] * mask.width + middle[0]];
+            assert!(at(&node.reach), "{spacer}: the lid comes down");
+            assert_eq!(at(&node.changed), !shows, "{spacer}");
+        }
+    }
 }

@@ -49,6 +49,7 @@ pub fn body(component: usize, mesh: TriMesh, pose: Isometry3<f64>) -> Body {
         kind: MaterialKind::Matt,
         n: 1.5,
         k: 0.0,
+        tints: Vec::new(),
         reflectance: 0.5,
         roughness: 0.5,
         edge_break: 0.0,
