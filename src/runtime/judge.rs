@@ -34,8 +34,9 @@ pub struct NodeImages {
 }
 
 impl NodeImages {
-    /// `None` when the node's plane is behind the camera.
-    pub fn new(node: &Node, nominal: &Camera, home: &Pose, lamps: usize) -> Option<NodeImages> {
+    /// `levelled` says that the node is judged by its contrast with its surroundings, see [`Light::level`]. `None` when its plane is
+    /// behind the camera.
+    pub fn new(node: &Node, nominal: &Camera, home: &Pose, lamps: usize, levelled: bool) -> Option<NodeImages> {
         let grid = |image: &Image| {
             let step = node.steps[image.lamp as usize] as f32;
             let values = image.rows.iter().flat_map(|row| &row.0).map(|&v| f32::from(v) * step).collect();
@@ -44,10 +45,16 @@ impl NodeImages {
         let mask = mask_of(node);
         let draws = |images: &Vec<Image>| images.chunks(lamps).map(|draw| draw.iter().map(grid).collect()).collect();
         let own = node.hypotheses.iter().map(|h| &h.images);
+        let stencil = Stencil::new(&mask, node.levels);
+        let surroundings = surroundings(&mask);
+        let mut wanted = stencil.covered(node.size.map(|s| s as usize));
+        if levelled {
+            wanted.iter_mut().zip(&surroundings).for_each(|(wanted, outside)| *wanted |= outside);
+        }
         Some(NodeImages {
-            window: Window::new(Frame::of(node), nominal, home)?,
-            stencil: Stencil::new(&mask, node.levels),
-            surroundings: surroundings(&mask),
+            window: Window::new(Frame::of(node), nominal, home)?.only(wanted),
+            stencil,
+            surroundings,
             spread: node.spread.map(|s| s / f64::from(node.factor)),
             hypotheses: own.chain(node.disturbed.iter().map(|d| &d.images)).map(draws).collect(),
             own: node.hypotheses.len(),
@@ -238,8 +245,9 @@ impl Prepared {
     /// `None` when a node cannot be seen by the model's own camera.
     pub fn new(model: &Model) -> Option<Prepared> {
         let home = Pose::home(&model.station);
-        let lamps = model.station.lamps.len();
-        let node = |n: &Node| NodeImages::new(n, &model.station.camera, &home, lamps);
+        let lamps = &model.station.lamps;
+        let levelled = Light::new(&vec![1.0; lamps.len()], lamps).is_open();
+        let node = |n: &Node| NodeImages::new(n, &model.station.camera, &home, lamps.len(), levelled);
         Some(Prepared { nodes: model.nodes.iter().map(node).collect::<Option<_>>()?, home })
     }
 

@@ -82,7 +82,7 @@ impl<'a> Look<'a> {
     }
 
     fn fit(&mut self, density: usize, shift: usize) {
-        let fit = self.densities[density].gaussian(&self.shifted[shift].coefficients);
+        let fit = self.densities[density].searched(&self.shifted[shift].coefficients);
         self.fits[density].push((shift, fit));
     }
 

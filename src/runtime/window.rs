@@ -31,6 +31,8 @@ impl Frame {
 pub struct Window {
     pub frame: Frame,
     points: Vec<Vec3>,
+    /// Which of them are looked at.
+    wanted: Vec<bool>,
 }
 
 /// Places of the node's pixels in a photo reduced by the node's factor (px).
@@ -49,30 +51,43 @@ impl Window {
                 points.push(home.invert(point));
             }
         }
-        Some(Window { frame, points })
+        let wanted = vec![true; points.len()];
+        Some(Window { frame, points, wanted })
+    }
+
+    /// The same window in which only these pixels are looked at: the others are cut as 0.
+    pub fn only(self, wanted: Vec<bool>) -> Window {
+        Window { wanted, ..self }
     }
 
     /// Where the pixels lie in a photo by `camera` of an assembly at `pose`.
     pub fn place(&self, camera: &Camera, pose: &Pose) -> Placed {
         let camera = camera.reduced(self.frame.factor);
         let outside = [f64::NEG_INFINITY; 2];
-        Placed(self.points.iter().map(|&p| camera.project(pose.apply(p)).unwrap_or(outside)).collect())
+        let place =
+            |(&p, &wanted): (&Vec3, &bool)| wanted.then(|| camera.project(pose.apply(p))).flatten().unwrap_or(outside);
+        Placed(self.points.iter().zip(&self.wanted).map(place).collect())
     }
 
     /// The node's image from a photo already reduced by the node's factor, moved by `shift` (node px). The second value is the
-    /// share of pixels inside the photo; those outside repeat their left neighbour.
+    /// share of the wanted pixels inside the photo; those outside repeat their left neighbour.
     pub fn cut(&self, reduced: &Grid, placed: &Placed, shift: [f64; 2]) -> (Grid, f64) {
         let [width, height] = self.frame.size.map(|s| s as usize);
         let mut values = Vec::with_capacity(width * height);
-        let (mut last, mut inside) = (0.0, 0usize);
-        for p in &placed.0 {
+        let (mut last, mut inside, mut all) = (0.0, 0usize, 0usize);
+        for (p, &wanted) in placed.0.iter().zip(&self.wanted) {
+            if !wanted {
+                values.push(0.0);
+                continue;
+            }
+            all += 1;
             if let Some(v) = reduced.sample([p[0] + shift[0], p[1] + shift[1]]) {
                 last = v;
                 inside += 1;
             }
             values.push(last);
         }
-        let share = inside as f64 / values.len() as f64;
+        let share = inside as f64 / all.max(1) as f64;
         (Grid::new(width, height, values), share)
     }
 }
@@ -121,6 +136,17 @@ impl Stencil {
 
     pub fn is_empty(&self) -> bool {
         self.cells.is_empty()
+    }
+
+    /// The pixels of a node of this size that lie in any cell.
+    pub fn covered(&self, [width, height]: [usize; 2]) -> Vec<bool> {
+        let mut covered = vec![false; width * height];
+        for c in &self.cells {
+            for y in c.y - c.half..(c.y + c.half).min(height) {
+                covered[y * width + c.x - c.half..y * width + (c.x + c.half).min(width)].fill(true);
+            }
+        }
+        covered
     }
 
     /// H and V of every cell.

@@ -178,7 +178,7 @@ impl Cutter<'_> {
     /// One round of expectation maximisation with the search in the loop: every draw moves to its most likely place.
     fn align(&self, node: &Node, samples: &mut [Sample]) -> Option<()> {
         let context = self.context;
-        let images = NodeImages::new(node, context.camera, &context.home, context.powers.len())?;
+        let images = NodeImages::new(node, context.camera, &context.home, context.powers.len(), true)?;
         let powers = Light::new(context.powers, context.lamps);
         let densities = images.densities(&powers, ALIGN_NOISE, &[]).0;
         let factor = (self.plan.frame.factor / context.plan.base) as usize;

@@ -27,8 +27,8 @@ const LEAST_PIXELS: usize = 8;
 const LEAST_OWN: usize = 100;
 /// A node has at most this many pixels in its mask, and this many times as many in its window; larger ones are taken at a
 /// coarser resolution. What shows through windows only is sparse: its mask is small in a large window.
-const MOST_NODE_PIXELS: u32 = 3000;
-const SPARSE: u32 = 4;
+const MOST_NODE_PIXELS: u32 = 12_000;
+const SPARSE: u32 = 2;
 /// A component disturbs a node when its own change covers this share of the node's.
 const DISTURBS: f64 = 0.3;
 /// A fault shows in another's node when its change covers this share of the node's.
