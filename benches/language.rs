@@ -4,12 +4,14 @@
 //! spec and waits for its diagnostics.
 
 use gonogo::artifacts::Artifact;
+use gonogo::assembly::piece::Shelf;
 use gonogo::{Options, compile, design, lsp, syntax};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::io::{BufRead, BufReader, Read as _, Write as _};
 use std::process::{Child, ChildStdout, Command, Stdio};
+use std::sync::Arc;
 
 /// Lines of the generated spec, about.
 const LINES: usize = 10_000;
@@ -62,6 +64,20 @@ fn design_10_000_lines(bencher: divan::Bencher) {
 fn check_pattern_wheel(bencher: divan::Bencher) {
     let options = Options { wanted: BTreeSet::from([Artifact::View]), ..Options::default() };
     bencher.bench(|| compile("pattern_wheel.gng", &|_| Ok(WHEEL.to_string()), &options, &|_| {}));
+}
+
+/// What follows a pause in typing: all stages of `check`, after a change in one of ten parts; with the solids that an editor's
+/// server keeps, and without.
+#[divan::bench(args = [true, false])]
+fn check_again_after_a_change(bencher: divan::Bencher, keeps: bool) {
+    let shelf = keeps.then(Arc::<Shelf>::default);
+    let round = Cell::new(0);
+    bencher.bench_local(|| {
+        round.set(round.get() + 1);
+        let text = WHEEL.replacen("length = 33.2", &format!("length = 33.{}", 2 + round.get() % 2), 1);
+        let options = Options { shelf: shelf.clone(), ..Options::default() };
+        compile("pattern_wheel.gng", &|_| Ok(text.clone()), &options, &|_| {})
+    });
 }
 
 /// From the keystroke to the diagnostics, without the pipe.

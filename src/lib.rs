@@ -153,6 +153,7 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
     line.enter(Stage::Solid)?;
     let shapes = line.shapes(&design)?;
     line.check(((), line::idle_cuts(&design, &shapes)));
+    line.check(((), line::upside_down(&design, &shapes)));
     let solids = line::per_component(&design, &shapes);
     line.keep(|made| made.solids = solids.clone());
     line.emit(Artifact::Brep, || artifacts::brep(&design, &shapes));
@@ -162,6 +163,7 @@ fn ready(spec: &str, read: design::Read, line: &mut line::Line) -> Option<line::
     let found = assembly::analyse(&design, &solids);
     line.keep(|made| made.analysis = Some(found.0.clone()));
     let analysis = line.check(found)?;
+    line.check_screws(&design, &analysis);
     let modes = || assembly::fault::all(&design, &analysis.liaison, &analysis.insertion, &solids);
     let trees = || assembly::error_tree::object_tree(&design, &analysis.liaison).trees;
     line.keep(|made| (made.trees, made.modes) = (trees(), modes()));

@@ -1,8 +1,11 @@
 //! What travels down the line beside the work itself: options, diagnostics, artifacts, progress; and the small joints
 //! between one stage's output and the next one's input.
 
+mod holes;
 mod limits;
+mod screws;
 
+pub(crate) use holes::upside_down;
 pub(crate) use limits::idle_cuts;
 
 use crate::artifacts::{self, Artifact, pictures};
@@ -258,6 +261,12 @@ impl<'a> Line<'a> {
         let stops = found.iter().any(Diagnostic::is_error);
         self.out.diagnostics.extend(found);
         (!stops).then_some(output)
+    }
+
+    /// Screws whose thread is in nothing.
+    pub fn check_screws(&mut self, design: &Design, analysis: &Analysis) {
+        let found = screws::loose(design, &self.out.sources, analysis);
+        self.out.diagnostics.extend(found);
     }
 
     /// The camera's place as it was chosen before; `None` within where it is to be chosen.

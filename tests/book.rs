@@ -91,6 +91,36 @@ fn links_and_pictures_lead_somewhere() {
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
+/// By mdBook itself, where it is installed: without a warning, and with every link of every page in place.
+#[test]
+fn the_book_is_built_without_a_warning() {
+    let Ok(version) = Command::new("mdbook").arg("--version").output() else {
+        return eprintln!("skipped: mdbook is not installed");
+    };
+    assert!(version.status.success());
+    let built = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mdbook");
+    let _ = fs::remove_dir_all(&built);
+    let output = Command::new("mdbook").args(["build", "docs", "-d"]).arg(&built).current_dir(root()).output().unwrap();
+    let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success() && !said.contains("WARN") && !said.contains("ERROR"), "{said}");
+    let mut broken = Vec::new();
+    for (name, _) in chapters().iter().filter(|(name, _)| name != "SUMMARY.md") {
+        let page = built.join(name).with_extension("html");
+        let html = fs::read_to_string(&page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));
+        for attribute in ["href=\"", "src=\""] {
+            for (at, _) in html.match_indices(attribute) {
+                let link = html[at + attribute.len()..].split('"').next().unwrap();
+                let file = link.split('#').next().unwrap();
+                let is_local = !file.is_empty() && !link.contains(':');
+                if is_local && !page.parent().unwrap().join(file).exists() {
+                    broken.push(format!("{name}: {link}"));
+                }
+            }
+        }
+    }
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
 /// What stands in `](…)`, outside of code.
 fn links(text: &str) -> Vec<String> {
     let mut prose = String::new();

@@ -8,6 +8,7 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 fn file(name: &str) -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap()
@@ -38,7 +39,7 @@ fn every_word_of_the_grammar_is_known_to_editors() {
     let word = Regex::new("[a-z]+").unwrap();
     let coloured: BTreeSet<String> = word.find_iter(&colours).map(|m| m.unwrap().as_str().to_string()).collect();
     for word in grammar_words() {
-        assert!(known.contains(word.as_str()), "`{word}` is in the grammar but not in src/lsp/words.rs");
+        assert!(known.contains(word.as_str()), "`{word}` is in the grammar but not in src/lsp/keywords.rs");
         assert!(coloured.contains(&word), "`{word}` is in the grammar but not in editors/gonogo.tmLanguage.json");
     }
 }
@@ -232,9 +233,30 @@ fn the_extension_is_whole() {
         assert!(code.contains(command["command"].as_str().unwrap()), "{command} is not in {main}");
     }
     assert!(code.contains("\"lsp\"") && package["dependencies"]["vscode-languageclient"].is_string());
+    // Packaging copies the grammar to where the package looks for it.
+    let grammar = contributes["grammars"][0]["path"].as_str().unwrap().trim_start_matches("./");
+    let prepackage = package["scripts"]["prepackage"].as_str().unwrap();
+    assert!(prepackage.contains("'../gonogo.tmLanguage.json'") && prepackage.contains(&format!("'{grammar}'")));
     let configuration = json("editors/vscode/language-configuration.json");
     assert_eq!(configuration["comments"]["lineComment"], "//");
     for rule in ["increaseIndentPattern", "decreaseIndentPattern"] {
         Regex::new(configuration["indentationRules"][rule].as_str().unwrap()).unwrap();
     }
+}
+
+/// The extension's own code, with the real server at the other end of its pipes: see tests/editor/extension.js.
+#[test]
+fn the_extension_starts_the_server_and_shows_its_pages() {
+    let node = Command::new("node").arg("--version").output();
+    if !node.is_ok_and(|node| node.status.success()) {
+        return eprintln!("skipped: node is not installed");
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut command = Command::new("node");
+    command.arg(root.join("tests/editor/extension.js")).arg(root.join("editors/vscode/extension.js"));
+    let output = command.arg(env!("CARGO_BIN_EXE_gonogo")).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<&str> = said.lines().collect();
+    let titles = ["E0305", "E0102"].map(|code| format!("# {code}: {}", gonogo::diag::title(code).unwrap()));
+    assert_eq!(lines, [&titles[0], "true", &titles[1], "2 to dispose of, ended with 0"], "{}", output.status);
 }

@@ -34,7 +34,7 @@ fn every_code_of_solids_and_assembly_is_shown() {
     let shown = BOOK.reports();
     for code in [
         "E0401", "W0402", "E0403", "E0405", "E0406", "E0407", "E0408", "E0501", "W0502", "E0503", "E0506", "W0507",
-        "E0508", "E0509",
+        "E0508", "E0509", "W0411", "W0510",
     ] {
         assert!(shown.contains(&format!("[{code}]")), "{code} has no test");
     }

@@ -10,7 +10,7 @@ use super::meeting::Entering;
 use super::place::place;
 use super::tight;
 use crate::design::model::Design;
-use crate::diag::Diagnostic;
+use crate::diag::{Diagnostic, Span};
 use crate::solid::{Solid, Surface};
 use nalgebra::{Isometry3, Point3};
 use std::sync::Arc;
@@ -18,11 +18,15 @@ use std::sync::Arc;
 /// A deliberate press fit interferes by at most this share of the diameter (ISO 286 u6 on small sizes has 0.5 %).
 const TIGHTEST_PRESS: f64 = 0.005;
 
+/// Copies named in a note.
+const NAMED: usize = 4;
+
 /// What the analysis saw.
 #[derive(Clone, Copy)]
 pub(crate) struct Seen<'a> {
     pub liaison: &'a Liaison,
     pub clashes: &'a [Clash],
+    pub squeezed: &'a [Clash],
     pub entering: &'a [Entering],
     pub tight: &'a [Tight],
 }
@@ -41,10 +45,34 @@ fn interference(design: &Design, solids: &[Arc<Solid>], seen: &Seen) -> Vec<Diag
     let pressed = seen.liaison.contacts.iter().filter(|c| presses_too_hard(c, solids));
     let pressed = pressed.map(|c| (c.a.component, c.b.component, press(design, solids, c)));
     let entering = seen.entering.iter().map(|e| (e.a, e.b, enters(design, e.a, e.b, e.depth)));
-    let mut found: Vec<(usize, usize, Diagnostic)> = clashes.chain(pressed).chain(entering).collect();
+    let squeezed = seen.squeezed.iter().map(|s| {
+        let pair = [s.a.component, s.b.component];
+        (pair[0].min(pair[1]), pair[0].max(pair[1]), too_large(design, solids, s.a, s.b, s.depth))
+    });
+    let mut found: Vec<(usize, usize, Diagnostic)> = clashes.chain(pressed).chain(squeezed).chain(entering).collect();
     found.sort_by_key(|(a, b, _)| (*a, *b));
     found.dedup_by_key(|(a, b, _)| (*a, *b));
-    found.into_iter().map(|(.., d)| d).collect()
+    once_per_placement(design, found)
+}
+
+/// Copies of one placement that enter the same component alike are told of once.
+fn once_per_placement(design: &Design, found: Vec<(usize, usize, Diagnostic)>) -> Vec<Diagnostic> {
+    let mut told: Vec<((Span, Span, String), Diagnostic, Vec<String>)> = Vec::new();
+    for (a, b, diagnostic) in found {
+        let [first, second] = [a, b].map(|c| &design.components[c]);
+        let key = (first.span, second.span, diagnostic.labels[0].text.replace(&first.name, ""));
+        match told.iter_mut().find(|(known, ..)| *known == key) {
+            Some((.., others)) => others.push(format!("`{}`", second.name)),
+            None => told.push((key, diagnostic, Vec::new())),
+        }
+    }
+    let alike = |(_, diagnostic, others): (_, Diagnostic, Vec<String>)| match others.len() {
+        0 => diagnostic,
+        n if n > NAMED => diagnostic.note(format!("so do {} and {} others", others[..NAMED].join(", "), n - NAMED)),
+        1 => diagnostic.note(format!("so does {}", others[0])),
+        _ => diagnostic.note(format!("so do {}", others.join(", "))),
+    };
+    told.into_iter().map(alike).collect()
 }
 
 fn clash(design: &Design, solids: &[Arc<Solid>], clash: &Clash) -> Diagnostic {
@@ -54,10 +82,15 @@ fn clash(design: &Design, solids: &[Arc<Solid>], clash: &Clash) -> Diagnostic {
 }
 
 fn press(design: &Design, solids: &[Arc<Solid>], c: &Contact) -> Diagnostic {
-    let (hole, pin) = (hollow(c), full(c));
+    too_large(design, solids, hollow(c), full(c), -c.gap)
+}
+
+/// A pin that is thicker than its hole by `depth` mm.
+fn too_large(design: &Design, solids: &[Arc<Solid>], hole: FaceRef, pin: FaceRef, depth: f64) -> Diagnostic {
     let [hole_name, pin_name] = [hole, pin].map(|f| face_name(design, solids, f));
     let [hole_d, pin_d] = [hole, pin].map(|f| diameter(solids, f).unwrap_or_default());
-    enters(design, c.a.component, c.b.component, -c.gap)
+    let [a, b] = [hole.component.min(pin.component), hole.component.max(pin.component)];
+    enters(design, a, b, depth)
         .note(format!("`{hole_name}` is smaller than `{pin_name}`: no press fit is as tight"))
         .help(format!("`{pin_name}` at most {hole_d:.3} across, or `{hole_name}` at least {pin_d:.3}"))
 }
@@ -99,7 +132,8 @@ const LINE_CONTACT: f64 = 0.02;
 fn untouched(design: &Design, solids: &[Arc<Solid>], seen: &Seen) -> Vec<Diagnostic> {
     let (liaison, mut inside) = (seen.liaison, vec![false; seen.liaison.components]);
     seen.entering.iter().for_each(|e| (inside[e.a], inside[e.b]) = (true, true));
-    seen.clashes.iter().for_each(|c| (inside[c.a.component], inside[c.b.component]) = (true, true));
+    let crossed = seen.clashes.iter().chain(seen.squeezed);
+    crossed.for_each(|c| (inside[c.a.component], inside[c.b.component]) = (true, true));
     let alone = |c: &usize| liaison.of(*c).next().is_none() && !inside[*c];
     let lonely: Vec<usize> = (1..liaison.components).filter(alone).collect();
     if lonely.is_empty() {

@@ -12,6 +12,7 @@ use super::overlap::{BINS, Chart, Flat, overlap, square_to};
 use super::place::place;
 use super::play::{Mating, Share};
 use super::sides::{Joint, Side};
+use super::squeeze::squeezed;
 use super::tangent;
 use crate::design::model::Design;
 use crate::solid::{Solid, Surface};
@@ -164,6 +165,8 @@ pub(crate) struct Found {
     /// Contacts in a line or a point.
     pub tangents: Vec<Contact>,
     pub clashes: Vec<Clash>,
+    /// Shafts much larger than the bores they stand in: the bore first.
+    pub squeezed: Vec<Clash>,
     pub tight: Vec<Tight>,
 }
 
@@ -253,6 +256,7 @@ impl<'a> Survey<'a> {
         let Some(candidate) = candidate(pair[0].1, pair[1].1) else {
             let touch = tangent::tangent([pair[0].1, pair[1].1], bodies, pair.map(|(f, _)| f.face));
             self.found.tangents.extend(touch.map(|t| t.contact(pair.map(|(f, _)| f))));
+            self.found.squeezed.extend(squeezed(pair, bodies));
             return;
         };
         let [(a, f), (b, g)] = pair;

@@ -34,6 +34,7 @@ mod room;
 pub(crate) mod sample;
 mod sides;
 mod silhouette;
+mod squeeze;
 mod stack;
 mod tangent;
 mod tight;
@@ -61,7 +62,8 @@ pub fn analyse(design: &Design, solids: &[Arc<Solid>]) -> (Analysis, Vec<Diagnos
     let found = contact::find(design, solids);
     let liaison = liaison::Liaison::with_tangents(design.components.len(), found.contacts, found.tangents);
     let (insertion, entering) = insertion::take_apart(design, solids, &liaison);
-    let seen = check::Seen { liaison: &liaison, clashes: &found.clashes, entering: &entering, tight: &found.tight };
+    let (clashes, squeezed) = (&found.clashes, &found.squeezed);
+    let seen = check::Seen { liaison: &liaison, clashes, squeezed, entering: &entering, tight: &found.tight };
     let mut diagnostics = check::check(design, solids, &seen);
     let (measures, faults) = measure::measures(design, solids);
     diagnostics.extend(faults);

@@ -92,7 +92,10 @@ impl Resolver {
             return;
         };
         for (again, _) in &roots[1..] {
-            self.duplicate("root", again, name.span);
+            let message = "an assembly has one root: all others are placed";
+            let fault = Diagnostic::error("E0202", again.span, message).label("a second root");
+            let help = format!("write `place {} on {}`", again.text, name.text);
+            self.report(fault.also(name.span, "the root").help(help));
         }
         let wanted = part.unwrap_or(name);
         let identity = Seat { component: usize::MAX, frame: PoseExpr::identity() };

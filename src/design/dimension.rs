@@ -35,6 +35,22 @@ pub fn unit(name: &str) -> Option<(Quantity, f64)> {
     })
 }
 
+/// What units are called in full, and abroad.
+pub fn unit_meant(name: &str) -> Option<&'static str> {
+    const NAMES: [(&str, &[&str]); 8] = [
+        ("in", &["inch", "inches", "zoll"]),
+        ("mm", &["millimeter", "millimetre", "millimeters", "millimetres"]),
+        ("um", &["micron", "microns", "micrometer", "micrometre"]),
+        ("cm", &["centimeter", "centimetre", "centimeters", "centimetres"]),
+        ("m", &["meter", "metre", "meters", "metres"]),
+        ("deg", &["degree", "degrees", "grad"]),
+        ("rad", &["radian", "radians"]),
+        ("px", &["pixel", "pixels"]),
+    ];
+    let name = name.to_ascii_lowercase();
+    NAMES.iter().find(|(_, names)| names.contains(&name.as_str())).map(|(unit, _)| *unit)
+}
+
 impl Resolver {
     /// The value of a dimension in a place that wants `want`. Limits of its own make a row named `name`.
     pub fn dimension(&mut self, dim: &ast::Dim, want: Quantity, general: General, name: &str) -> Option<Expr> {
@@ -151,7 +167,8 @@ impl Resolver {
             // A slip of the pen seldom changes the first letter.
             let mut known = ["mm", "um", "cm", "m", "in", "deg", "rad", "px"];
             known.sort_by_key(|k| k.chars().next() != name.text.chars().next());
-            let help = nearest(&name.text, known)
+            let help = unit_meant(&name.text)
+                .or_else(|| nearest(&name.text, known))
                 .or_else(|| known.into_iter().find(|k| k.len() > 1 && name.text.starts_with(k)));
             let diagnostic = Diagnostic::error("E0204", name.span, format!("unknown unit `{}`", name.text))
                 .label("not a unit")

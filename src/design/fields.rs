@@ -4,13 +4,14 @@
 //! unknown, given twice or missing.
 
 use super::dimension::trim;
+use super::elsewhere;
 use super::feature::Names;
 use super::model::Expr;
 use super::scope::Resolver;
 use super::tolerance::General;
 use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
-use crate::syntax::ast::{Args, Body, Dim, Name, Point, Stmt, Value};
+use crate::syntax::ast::{Args, Body, Dim, Name, Point, Size, Stmt, Tolerance, Value};
 use crate::units::{Quantity, Range};
 
 /// The fields of one call or block.
@@ -54,24 +55,6 @@ fn behind(span: Span) -> Span {
     Span { start: span.end, ..span }
 }
 
-/// What arguments are called elsewhere.
-const SYNONYMS: [(&str, &str); 14] = [
-    ("dia", "d"),
-    ("diam", "d"),
-    ("diameter", "d"),
-    ("height", "h"),
-    ("length", "h"),
-    ("len", "h"),
-    ("l", "h"),
-    ("depth", "h"),
-    ("width", "x"),
-    ("length", "x"),
-    ("height", "z"),
-    ("thickness", "z"),
-    ("profile", "outline"),
-    ("distance", "pitch"),
-];
-
 /// A word a field may hold, and what it means.
 pub type Words<'w, T> = &'w [(&'w str, T)];
 
@@ -95,14 +78,32 @@ impl Resolver {
         let takes = known.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
         let message = format!("`{}` has no `{}`", fields.owner, name.text);
         let diagnostic = Diagnostic::error("E0206", name.span, message).label("unknown here");
-        let synonym =
-            SYNONYMS.iter().find(|(word, key)| *word == name.text && known.contains(key)).map(|(_, key)| *key);
-        let free = |key: &&str| fields.get(key).is_none();
-        let near = synonym.or_else(|| nearest(&name.text, known.iter().copied())).filter(free);
+        let taken = |key: &str| self.meant.iter().any(|(owner, meant)| *owner == fields.span && meant == key);
+        let free: Vec<&str> = known.iter().copied().filter(|k| fields.get(k).is_none() && !taken(k)).collect();
+        let is_radius = ["r", "radius", "rad"].contains(&name.text.as_str());
+        if is_radius && free.contains(&"d") && !free.contains(&"r") {
+            self.meant.push((fields.span, "d".to_string()));
+            let diagnostic = diagnostic.note(format!("it takes {takes}"));
+            return self.report(match fields.get(&name.text).and_then(doubled) {
+                Some(text) => diagnostic.suggest(
+                    format!("a diameter is twice the radius: write `d = {text}`"),
+                    Span { end: fields.get(&name.text).map_or(name.span, Value::span).end, ..name.span },
+                    format!("d = {text}"),
+                ),
+                None => diagnostic.help("a diameter is twice the radius: write it as `d`"),
+            });
+        }
+        let near = elsewhere::field(&name.text, &free).first().copied();
+        let near = near.or_else(|| nearest(&name.text, free.iter().copied()));
         self.meant.extend(near.map(|near| (fields.span, near.to_string())));
-        self.report(match near {
-            Some(near) => diagnostic.meant(name.span, near).note(format!("it takes {takes}")),
-            None => diagnostic.help(format!("it takes {takes}")),
+        if is_radius && near == Some("r") {
+            // A circle has one of the two.
+            self.meant.push((fields.span, "d".to_string()));
+        }
+        self.report(match (near, elsewhere::instead(&fields.owner, &name.text)) {
+            (_, Some(instead)) => diagnostic.help(instead).note(format!("it takes {takes}")),
+            (Some(near), None) => diagnostic.meant(name.span, near).note(format!("it takes {takes}")),
+            (None, None) => diagnostic.help(format!("it takes {takes}")),
         });
     }
 
@@ -156,13 +157,39 @@ impl Resolver {
     ) -> Range {
         let range = self.range_or(fields, key, want, default);
         if range.low < low || range.high > high {
-            let span = fields.get(key).map_or(fields.span, Value::span);
-            let most = if high < f64::MAX { format!("{low} .. {high}") } else { format!("{low} or more") };
-            let message = format!("`{key}` must be {most}, this is {} .. {}", range.low, range.high);
-            self.report(Diagnostic::error("E0211", span, message).label("out of range"));
+            self.out_of_range(fields, key, want, range, [low, high]);
             return default;
         }
         range
+    }
+
+    /// Reports a range beyond its bounds, in the unit of its file.
+    fn out_of_range(&mut self, fields: &Fields, key: &str, want: Quantity, range: Range, [low, high]: [f64; 2]) {
+        let span = fields.get(key).map_or(fields.span, Value::span);
+        let scale = self.file_scale(want, span);
+        let shown = |value: f64| trim(value / scale);
+        let between = |low: f64, high: f64| match shown(low) == shown(high) {
+            true => shown(low).to_string(),
+            false => format!("{} .. {}", shown(low), shown(high)),
+        };
+        let most = match (shown(low) == 0.0 && low > 0.0, high < f64::MAX) {
+            (true, false) => "more than 0".to_string(),
+            (false, false) => format!("{} or more", shown(low)),
+            (_, true) => between(low, high),
+        };
+        let message = format!("`{key}` must be {most}, this is {}", between(range.low, range.high));
+        let fault = Diagnostic::error("E0211", span, message).label("out of range");
+        // What of it lies within, where something does.
+        let within = [range.low.max(low), range.high.min(high)];
+        // Not where the bound itself is excluded.
+        let good = shown(within[0]) * scale >= low && within[0] < within[1] && range.low < range.high;
+        self.report(match good {
+            true => {
+                let text = between(within[0], within[1]);
+                fault.suggest(format!("write `{key} = {text}`"), span, text)
+            }
+            false => fault,
+        });
     }
 
     /// A number without limits, or `default`.
@@ -247,6 +274,18 @@ impl Resolver {
         let z = exprs.next().unwrap_or(Some(Expr::Const(0.0)))?;
         Some([x, y, z])
     }
+}
+
+/// A size without limits, or with a fit, twice as large.
+fn doubled(value: &Value) -> Option<String> {
+    let Value::Dim(Dim { size: Size::Quantity(q), tolerance, .. }) = value else { return None };
+    let unit = q.unit.as_ref().map_or(String::new(), |unit| format!(" {}", unit.text));
+    let fit = match tolerance {
+        None => String::new(),
+        Some(Tolerance::Fit(class)) => format!(" {}", class.text),
+        Some(_) => return None,
+    };
+    Some(format!("{}{unit}{fit}", trim(2.0 * q.number.value)))
 }
 
 /// The coordinates, each with the unit behind the parentheses unless it has its own.

@@ -151,14 +151,23 @@ impl Loader<'_> {
             self.sources.files.push((path.to_string(), String::new()));
         }
         let message = format!("`{path}` cannot be read: {error}");
-        self.diagnostics.push(Diagnostic::error("E0201", from.unwrap_or_default(), message).label("no such file"));
+        let span = from.unwrap_or_default();
+        let fault = Diagnostic::error("E0201", span, message).label("no such file");
+        // The library's files are named without their ending.
+        let shelf = path.strip_suffix(".gng").and_then(|name| library::text(name).map(|_| name));
+        let shelf =
+            shelf.or_else(|| path.rsplit('/').next().and_then(|n| library::home_of(n.trim_end_matches(".gng"))));
+        self.diagnostics.push(match shelf.filter(|_| from.is_some()) {
+            Some(name) => fault.suggest(format!("the parts library has `{name}`"), span, format!("\"{name}\"")),
+            None => fault,
+        });
     }
 
     fn not_in_library(&mut self, name: &str, span: Span) {
         let message = format!("the parts library has no `{name}`");
         let diagnostic = Diagnostic::error("E0201", span, message).label("not in the library");
         self.diagnostics.push(match library::nearest_file(name) {
-            Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
+            Some(near) => diagnostic.suggest(format!("did you mean `{near}`?"), span, format!("\"{near}\"")),
             None => diagnostic.help(format!("a file of your own ends in `.gng`: `use \"{name}.gng\"`")),
         });
     }

@@ -6,6 +6,7 @@
 mod assemble;
 mod beside;
 mod dimension;
+mod elsewhere;
 pub mod essence;
 mod family;
 mod feature;

@@ -157,6 +157,17 @@ impl Resolver {
 
     /// Index of the material a field names.
     pub fn material_named(&mut self, value: &Value, materials: &BTreeMap<&str, usize>) -> usize {
+        if let Value::Text(name) = value
+            && materials.contains_key(name.text.as_str())
+        {
+            let message = "a name stands without quotes";
+            self.report(Diagnostic::error("E0211", name.span, message).label("a string").fix(
+                format!("write `material = {}`", name.text),
+                name.span,
+                name.text.clone(),
+            ));
+            return 0;
+        }
         let Value::Dim(dim) = value else {
             self.wrong_form(value.span(), "the name of a material");
             return 0;

@@ -4,6 +4,7 @@
 //! wrong is left with the [`Resolver`]. Never reads a text.
 
 use super::assemble::{Assembled, Catalogue};
+use super::dimension;
 use super::family::Family;
 use super::load::Tree;
 use super::model::{Design, Material, Station};
@@ -100,7 +101,9 @@ impl Resolver {
             let known = table.iter().find(|(unit, _)| *unit == name.text);
             known.map(|(_, factor)| *factor).unwrap_or_else(|| {
                 let message = format!("unknown unit `{}`", name.text);
-                let near = nearest(&name.text, table.iter().map(|(unit, _)| *unit)).unwrap_or(example);
+                let units = || table.iter().map(|(unit, _)| *unit);
+                let near = dimension::unit_meant(&name.text).filter(|meant| units().any(|unit| unit == *meant));
+                let near = near.or_else(|| nearest(&name.text, units())).unwrap_or(example);
                 self.report(Diagnostic::error("E0204", name.span, message).label("not a unit here").suggest(
                     format!("write `{near}`"),
                     name.span,

@@ -235,6 +235,11 @@ impl Resolver {
             Diagnostic::error("E0201", span, format!("no dimension is named `{name}`")).label("unknown name");
         let diagnostic = match (near, self.inside.get(name)) {
             (Some(near), None) => diagnostic.meant(span, &near),
+            (None, None) if thread(name).is_some() => {
+                let size = thread(name).unwrap_or_default();
+                let title = format!("a thread is drawn with its major diameter: write `{size} basic`");
+                diagnostic.suggest(title, span, format!("{size} basic"))
+            }
             (None, None) => diagnostic.help(format!("define it above: `let {name} = 10`")),
             (near, Some((part, defined))) => {
                 let diagnostic = diagnostic.also(*defined, format!("this one belongs to the pieces of `{part}`"));
@@ -246,4 +251,10 @@ impl Resolver {
         };
         self.report(diagnostic);
     }
+}
+
+/// The diameter in `M6` or `M2.5`.
+fn thread(name: &str) -> Option<&str> {
+    let size = name.strip_prefix('M')?;
+    size.parse::<f64>().is_ok_and(|d| (1.0..=100.0).contains(&d)).then_some(size)
 }

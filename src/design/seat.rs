@@ -99,10 +99,11 @@ impl Resolver {
             return Some((index.first as usize - 1..last as usize).collect());
         }
         let message = format!("`{}` has {}", segment.name.text, copies(count));
+        let last = format!("[{}]", index.first.clamp(1, count.max(1) as u64));
         self.report(Diagnostic::error("E0505", index.span, message).label("no such copy").suggest(
-            format!("write `{}[1]`", segment.name.text),
+            format!("write `{}{last}`", segment.name.text),
             index.span,
-            "[1]",
+            last,
         ));
         None
     }

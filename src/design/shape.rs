@@ -56,7 +56,8 @@ impl Resolver {
         let diagnostic = Diagnostic::error("E0201", name.span, format!("no shape is named `{word}`"))
             .label("unknown shape")
             .note(format!("shapes: {}; and `group {{ … }}`", WORDS.join(", ")));
-        self.report(match nearest(word, WORDS) {
+        let near = super::elsewhere::call(word, &WORDS).or_else(|| nearest(word, WORDS));
+        self.report(match near {
             _ if word == "group" => {
                 diagnostic.help("a group has braces: `group { add body = box(x = 1, y = 1, z = 1) }`")
             }

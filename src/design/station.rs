@@ -3,9 +3,12 @@
 //! Every field has a default; docs/src/language.md lists them. A station with several named cameras (a rig) comes out as one
 //! [`Station`] a camera, `line.top` and `line.side`, which share all but the camera.
 
+use super::dimension::trim;
+use super::elsewhere;
 use super::fields::Fields;
 use super::model::{CameraPlacing, CameraSpec, Colour, Floor, LightShape, LightSpec, PerPhoto, Response, Station};
 use super::scope::Resolver;
+use crate::diag::suggest::nearest;
 use crate::diag::{Diagnostic, Span};
 use crate::syntax::ast::{Body, Call, Name, Stmt, Value};
 use crate::units::{Quantity, Range};
@@ -295,7 +298,7 @@ impl Resolver {
         self.report(
             Diagnostic::error("E0211", span, message)
                 .label("not symmetric about zero")
-                .help(format!("write `{key} = 0 ±{default:.1}`")),
+                .help(format!("write `{key} = 0 ±{}`", trim(default / self.file_scale(want, span)))),
         );
         default
     }
@@ -312,7 +315,12 @@ impl Resolver {
             other => {
                 let message = format!("no light is named `{other}`");
                 let diagnostic = Diagnostic::error("E0201", call.name.span, message).label("unknown light");
-                self.report(diagnostic.help("write `ring`, `panel`, `bar` or `room`"));
+                const LIGHTS: [&str; 4] = ["ring", "panel", "bar", "room"];
+                let near = elsewhere::call(other, &LIGHTS).or_else(|| nearest(other, LIGHTS));
+                self.report(match near {
+                    Some(near) => diagnostic.meant(call.name.span, near).note("lights: ring, panel, bar, room"),
+                    None => diagnostic.help("write `ring`, `panel`, `bar` or `room`"),
+                });
                 return None;
             }
         };

@@ -146,18 +146,24 @@ fn off_by(part: &Part, feature: &Feature, copy: usize, nominal: &[f64], solid: &
 fn changed(part: &Part, [nominal, mmc, lmc]: &[Arc<Solid>; 3]) -> Option<Diagnostic> {
     let names = |solid: &Solid| -> BTreeSet<String> { solid.faces.iter().map(|f| f.name.clone()).collect() };
     let own = names(nominal);
-    let at = |limit: &str, solid: &Solid| -> Option<String> {
+    let at = |limit: &str, solid: &Solid| -> Option<(String, Option<String>)> {
         let there = names(solid);
-        let gone = own.difference(&there).next().map(|f| format!("at {limit} the face `{f}` is gone"));
+        let named = |face: Option<&String>, text: &dyn Fn(&str) -> String| face.map(|f| (text(f), Some(f.clone())));
+        let gone = named(own.difference(&there).next(), &|f| format!("at {limit} the face `{f}` is gone"));
         let came =
-            there.difference(&own).next().map(|f| format!("at {limit} there is a face `{f}` that nominal has not"));
+            named(there.difference(&own).next(), &|f| format!("at {limit} there is a face `{f}` that nominal has not"));
         let count = (nominal.faces.len(), solid.faces.len());
         let more = (count.0 != count.1).then(|| format!("nominal has {} faces, {limit} has {}", count.0, count.1));
-        gone.or(came).or(more)
+        gone.or(came).or(more.map(|more| (more, None)))
     };
-    let what = at("MMC", mmc).or_else(|| at("LMC", lmc))?;
+    let (what, face) = at("MMC", mmc).or_else(|| at("LMC", lmc))?;
     let message = format!("`{}` changes its shape within tolerance: {what}", part.name);
-    Some(Diagnostic::error("E0403", part.span, message).label("not one shape but several").note(
+    let fault = Diagnostic::error("E0403", part.span, message).label("not one shape but several").note(
         "an inspector is trained on one shape; keep walls and steps wider than their tolerances, or tighten these",
-    ))
+    );
+    let owner = |f: &&Feature| face.as_ref().is_some_and(|face| face.split(['.', '[']).next() == Some(&f.name));
+    Some(match part.features.iter().find(owner) {
+        Some(feature) => fault.also(feature.span, format!("`{}` comes or goes", face.as_deref().unwrap_or_default())),
+        None => fault,
+    })
 }

@@ -12,6 +12,7 @@ mod fixes;
 mod hints;
 mod hover;
 mod index;
+mod keywords;
 mod layout;
 mod numbers;
 mod outline;

@@ -36,6 +36,7 @@ mod tests;
 use crate::design::model::{Part, Values};
 use crate::diag::Diagnostic;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use std::f64::consts::PI;
 
 pub use quality::Quality;
 pub use region::Counts;
@@ -225,5 +226,22 @@ impl TriMesh {
             normals: self.normals.iter().map(|n| n.map(|v| pose.rotation * v)).collect(),
             faces: self.faces.clone(),
         }
+    }
+
+    /// Whether the mesh, a closed one, holds a point: all around it, its triangles fill the whole sphere of directions.
+    pub fn holds(&self, p: &Point3<f64>) -> bool {
+        let within = |axis: usize| {
+            let along = || self.positions.iter().map(|q| q[axis]);
+            along().any(|v| v <= p[axis]) && along().any(|v| v >= p[axis])
+        };
+        (0..3).all(within) && self.triangles.iter().map(|t| self.solid_angle(t, p)).sum::<f64>() > 2.0 * PI
+    }
+
+    /// The signed solid angle of a triangle seen from a point (van Oosterom and Strackee, 1983).
+    fn solid_angle(&self, triangle: &[u32; 3], p: &Point3<f64>) -> f64 {
+        let [a, b, c] = triangle.map(|i| self.positions[i as usize] - p);
+        let [la, lb, lc] = [a.norm(), b.norm(), c.norm()];
+        let below = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+        2.0 * a.dot(&b.cross(&c)).atan2(below)
     }
 }

@@ -118,6 +118,7 @@ impl Cleaner {
             let in_comment = covered(comments, here, here + 1);
             match c {
                 _ if in_comment || here == 0 && c == '\u{feff}' => {}
+                '"' if quoted.is_none() && before.is_ascii_digit() => self.inches(here),
                 '"' | '“' | '”' | '„' | '‟' => {
                     quoted = if quoted.is_some() { None } else { Some(here) };
                     if c != '"' {
@@ -155,6 +156,14 @@ impl Cleaner {
         let end = here + c.len_utf8();
         self.blank(here, end);
         self.text[if opens { end - 1 } else { here }] = b'"';
+    }
+
+    /// `3"` on a drawing in inches.
+    fn inches(&mut self, here: usize) {
+        let span = self.span(here, 1);
+        let fault = Diagnostic::error("E0204", span, "inches are `in`").label("no unit");
+        self.diagnostics.push(fault.fix("write `in`", span, " in"));
+        self.blank(here, here + 1);
     }
 
     fn semicolon(&mut self, here: usize, rest: &str, line: &str) {
@@ -382,6 +391,14 @@ mod tests {
         assert_eq!(both("use “a.gng”\n"), ("use   \"a.gng\"  \n".into(), "use \"a.gng\"\n".into()));
         let (read, fixed) = both("use \"a.gng\nlet b = 1\n");
         assert_eq!((read.as_str(), fixed.as_str()), ("          \nlet b = 1\n", "use \"a.gng\"\nlet b = 1\n"));
+    }
+
+    #[test]
+    fn inches_have_a_unit_of_letters() {
+        assert_eq!(both("let a = 3\"\n"), ("let a = 3 \n".into(), "let a = 3 in\n".into()));
+        let (read, fixed) = both("add b = box(x = 3\", y = 2\")\nuse \"std/iso4762\"\n");
+        assert_eq!(read, "add b = box(x = 3 , y = 2 )\nuse \"std/iso4762\"\n");
+        assert_eq!(fixed, "add b = box(x = 3 in, y = 2 in)\nuse \"std/iso4762\"\n");
     }
 
     #[test]

@@ -108,6 +108,8 @@ struct Open {
     indent: usize,
     /// Of the first line inside; a block's lines say where it ends.
     inner: Option<usize>,
+    /// Its statements begin on its own line: `{ z = 3`.
+    filled: bool,
     operators: usize,
 }
 
@@ -224,7 +226,10 @@ impl<'a> Scanner<'a> {
     fn brackets(&mut self, start: usize, code: &str, indent: usize) {
         for (at, byte) in outside_strings(code) {
             match byte {
-                b'(' | b'{' => self.open(Open { bracket: byte, at: start + at, indent, inner: None, operators: 0 }),
+                b'(' | b'{' => {
+                    let filled = !code.as_bytes()[at + 1..].trim_ascii().is_empty();
+                    self.open(Open { bracket: byte, at: start + at, indent, inner: None, filled, operators: 0 });
+                }
                 b')' => self.close(b'(', start + at, None),
                 b'}' => self.close(b'{', start + at, code[..at].trim().is_empty().then_some(indent)),
                 b'+' | b'-' | b'*' | b'/' => self.operator(),
@@ -354,9 +359,10 @@ impl<'a> Scanner<'a> {
         self.repairs.extend((from..to).filter(|&i| bytes[i] != b'\n' && bytes[i] != b'\r').map(|i| (i, b' ')));
     }
 
-    /// A line no deeper than the head of a block whose lines stand deeper.
+    /// A line no deeper than the head of a block whose lines stand deeper, or that has some on its own line.
     fn lose_blocks_left_by(&mut self, indent: usize) {
-        let left = |o: &Open| o.bracket == b'{' && indent <= o.indent && o.inner.is_some_and(|inner| inner > o.indent);
+        let left =
+            |o: &Open| o.bracket == b'{' && indent <= o.indent && o.inner.map_or(o.filled, |inner| inner > o.indent);
         while self.open.last().is_some_and(left) {
             self.lose_last(Before::Line(self.line_start), self.line_start);
         }

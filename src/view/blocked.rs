@@ -7,9 +7,7 @@ use crate::design::model::{Design, LightShape, Station};
 use crate::diag::{Diagnostic, Span};
 use crate::runtime::camera::{Camera, Vec3};
 use crate::scene::Body;
-use crate::solid::TriMesh;
 use nalgebra::Point3;
-use std::f64::consts::PI;
 
 /// The camera, if it is blocked: what it sees means nothing then.
 pub fn camera(design: &Design, station: &Station, bodies: &[Body], camera: &Camera) -> Option<Diagnostic> {
@@ -41,7 +39,7 @@ fn fault(
 ) -> Option<Diagnostic> {
     let [x, y, z] = at;
     let place = format!("it stands at ({x:.1}, {y:.1}, {z:.1})");
-    if let Some(body) = bodies.iter().find(|body| holds(&body.mesh, &(body.pose.inverse() * Point3::from(at)))) {
+    if let Some(body) = bodies.iter().find(|body| body.mesh.holds(&(body.pose.inverse() * Point3::from(at)))) {
         let component = &design.components[body.component];
         let message = format!("{what} stands inside `{}`", component.name);
         let fault = Diagnostic::error("E0603", span, message).label(place).also(component.span, "placed here");
@@ -50,23 +48,6 @@ fn fault(
     let floor = station.floor.as_ref().filter(|floor| z < floor.z)?;
     let message = format!("{what} stands below the floor, which is at z = {}", floor.z);
     Some(Diagnostic::error("E0603", span, message).label(place).help(help))
-}
-
-/// Whether a closed mesh holds a point: all around it, its triangles fill the whole sphere of directions.
-fn holds(mesh: &TriMesh, p: &Point3<f64>) -> bool {
-    let within = |axis: usize| {
-        let along = || mesh.positions.iter().map(|q| q[axis]);
-        along().any(|v| v <= p[axis]) && along().any(|v| v >= p[axis])
-    };
-    (0..3).all(within) && mesh.triangles.iter().map(|t| solid_angle(mesh, t, p)).sum::<f64>() > 2.0 * PI
-}
-
-/// The signed solid angle of a triangle seen from a point (van Oosterom and Strackee, 1983).
-fn solid_angle(mesh: &TriMesh, triangle: &[u32; 3], p: &Point3<f64>) -> f64 {
-    let [a, b, c] = triangle.map(|i| mesh.positions[i as usize] - p);
-    let [la, lb, lc] = [a.norm(), b.norm(), c.norm()];
-    let below = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-    2.0 * a.dot(&b.cross(&c)).atan2(below)
 }
 
 #[cfg(test)]
@@ -88,11 +69,11 @@ mod tests {
                 share(0.569_84) * 10.0 - 1.0,
             );
             let in_block = p.x.abs() < 10.0 && p.y.abs() < 5.0 && p.z > 0.0 && p.z < 4.0;
-            assert_eq!(holds(&block, &p), in_block, "{p}");
+            assert_eq!(block.holds(&p), in_block, "{p}");
             let r = p.x.hypot(p.y);
             // The sides of the prism lie up to 0.004 mm inside of the cylinder.
             if (r - 6.0).abs() > 0.01 {
-                assert_eq!(holds(&round, &p), r < 6.0 && p.z > 0.0 && p.z < 8.0, "{p}");
+                assert_eq!(round.holds(&p), r < 6.0 && p.z > 0.0 && p.z < 8.0, "{p}");
             }
             inside += u32::from(in_block);
         }

@@ -354,6 +354,9 @@ fn report(design: &Design, station: &Station, table: &[Scored], (watch, found): 
     let mut fault = Diagnostic::error("E0601", station.camera.span, message)
         .label(format!("sees {visible} px of it; at least {LEAST_PIXELS} are needed"))
         .also(component.span, if full == 0 { "outside the image" } else { "hidden behind other components" });
+    let other = if is_auto { "other ranges of `elevation` and `azimuth`" } else { "another place of the camera" };
+    let way = if full == 0 { "a larger `distance`, or an `aim` nearer to it" } else { other };
+    fault = fault.help(format!("{way}, or `ignore {name}` in `inspect`: then no photo is asked about it"));
     if let (true, Some(view)) = (is_auto, elsewhere) {
         fault = fault.note(format!("{}, a view that loses more than it gains", describe(view, watch)));
     }

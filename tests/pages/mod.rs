@@ -74,7 +74,8 @@ impl Book {
         let gone = count(&after, diagnostic) < count(before, diagnostic);
         // What could not be read may have hidden faults of meaning.
         let of_text = |d: &&Diagnostic| d.code.starts_with("E01") || d.code == "E0309";
-        let hidden = before.iter().any(|d| of_text(&d));
+        let unread = |d: &Diagnostic| ["no such file", "not in the library"].contains(&d.labels[0].text.as_str());
+        let hidden = before.iter().any(|d| of_text(&d) || unread(d));
         // The rest of a line is looked at only when its first mistake is mended.
         let line = |text: &str, at: u32| text[..at as usize].matches('\n').count();
         let changed: Vec<usize> = fix.edits.iter().map(|e| line(text, e.span.start)).collect();

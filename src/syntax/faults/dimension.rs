@@ -15,6 +15,13 @@ fn tolerance_slip(text: &str, at: usize) -> Option<Slip> {
     let whole = |slip: Slip, text: String| slip.fix(format!("write `{text}`"), start, dim.len(), text);
     let maybe =
         |slip: Slip, why: &str, text: String| slip.suggest(format!("write `{text}` {why}"), start, dim.len(), text);
+    if let Some((deviations, unit)) = deviations_with_units(dim) {
+        let text = format!("{deviations} {unit}");
+        return Some(whole(
+            slip("E0104", "the unit of two deviations stands behind both".into(), "a unit between them"),
+            text,
+        ));
+    }
     match words.as_slice() {
         [size, pair] if is_fit_pair(pair) => {
             let (hole, shaft) = pair.split_once('/')?;
@@ -66,6 +73,18 @@ fn tolerance_slip(text: &str, at: usize) -> Option<Slip> {
         )),
         _ => None,
     }
+}
+
+/// `6 +0.1 mm/-0.2 mm`: the dimension without its units, and the unit.
+fn deviations_with_units(dim: &str) -> Option<(String, &str)> {
+    let (left, right) = dim.split_once('/')?;
+    let (left, right): (Vec<&str>, Vec<&str>) = (left.split_whitespace().collect(), right.split_whitespace().collect());
+    let [size @ .., upper, unit] = left.as_slice() else { return None };
+    let is_unit = |word: &str| ["mm", "um", "cm", "in", "deg"].contains(&word);
+    let (lower, other) = (right.first()?, right.get(1).copied().unwrap_or(unit));
+    let plain = |word: &str| is_signed(word) || word == "0";
+    let good = plain(upper) && plain(lower) && is_unit(unit) && other == *unit && right.len() <= 2 && !size.is_empty();
+    good.then(|| (format!("{} {upper}/{lower}", size.join(" ")), *unit))
 }
 
 /// A number as it is written elsewhere: `80,5`, `.2`, `5.`, `8.1...8.2`, `1 080`, `H 7`.

@@ -77,7 +77,9 @@ fn no_equals(text: &str, at: usize) -> Option<Slip> {
     let first = token_at(value, 0);
     let is_value = value.starts_with(|c: char| c.is_ascii_alphanumeric() || matches!(c, '"' | '(' | '-' | '.'));
     let next = value[first.len()..].trim_start();
-    (gap > 0 && is_value && !next.starts_with('=')).then(|| {
+    // `fillet edge r = 2` is no field.
+    let one = !strip_comment(rest).split('(').next().unwrap_or_default().contains('=');
+    (gap > 0 && is_value && one && !next.starts_with('=')).then(|| {
         Slip::new("E0101", end + gap, first.len().max(1), message, "not expected here").fix(
             format!("write `{key} = {first}`"),
             end,

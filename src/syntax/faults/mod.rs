@@ -4,8 +4,11 @@
 //! usual slips (a sum without parentheses, deviations without a slash, a pair of fits, a forgotten comma, a misspelt
 //! keyword) are recognised from the text around that place, and come with their fix.
 
+mod calls;
 mod dimension;
+mod elsewhere;
 mod fields;
+mod joined;
 mod placing;
 
 use crate::diag::suggest::nearest;
@@ -96,8 +99,12 @@ pub fn describe(text: &str, fault: &Fault, file: u32, offset: usize) -> Diagnost
     let at = text.len() - text[fault.at..].trim_start_matches([' ', '\t']).len();
     let slip = dimension::slip(text, fault.at)
         .or_else(|| bare_feature(text, fault.at))
+        .or_else(|| foreign_statement(text, at))
+        .or_else(|| calls::slip(text, at, &fault.expected))
         .or_else(|| fields::slip(text, at, &fault.expected))
         .or_else(|| placing::slip(text, at))
+        .or_else(|| joined::slip(text, at))
+        .or_else(|| title_line(text, at))
         .or_else(|| misspelt_before(text, at, &fault.expected));
     slip.unwrap_or_else(|| unexpected(text, at, &fault.expected)).diagnostic(span)
 }
@@ -116,18 +123,24 @@ fn unexpected(text: &str, at: usize, expected: &[&'static str]) -> Slip {
         false => format!("expected {}, found {}", list(&others), spoken(found)),
     };
     let slip = Slip::new("E0101", at, found.trim_end().len(), message, "not expected here");
-    match keyword_meant(found, expected) {
-        Some(meant) => slip.fix(format!("did you mean `{meant}`?"), at, found.len(), meant),
-        None => slip,
+    match (elsewhere::keyword(found, expected), keyword_meant(found, expected)) {
+        (Some(ours), _) => slip.suggest(format!("write `{ours}`"), at, found.len(), ours),
+        (None, Some(meant)) => slip.fix(format!("did you mean `{meant}`?"), at, found.len(), meant),
+        (None, None) => slip,
     }
 }
 
 /// A line outside all braces that begins with no word for it.
 fn begins_nothing(at: usize, found: &str) -> Slip {
+    if ITEMS.iter().any(|item| item.trim_matches('`') == found) {
+        let slip = Slip::new("E0101", at, found.len(), format!("`{found}` cannot stand here"), "not in this block");
+        return slip.help("move it out of all braces");
+    }
     let slip = Slip::new("E0101", at, found.len(), format!("no statement begins with `{found}`"), "unknown here");
-    match keyword_meant(found, &ITEMS) {
-        Some(meant) => slip.fix(format!("did you mean `{meant}`?"), at, found.len(), meant),
-        None => slip.help(format!("outside of braces a line begins with {}", list(&ITEMS))),
+    match (elsewhere::keyword(found, &ITEMS), keyword_meant(found, &ITEMS)) {
+        (Some(ours), _) => slip.suggest(format!("write `{ours}`"), at, found.len(), ours),
+        (None, Some(meant)) => slip.fix(format!("did you mean `{meant}`?"), at, found.len(), meant),
+        (None, None) => slip.help(format!("outside of braces a line begins with {}", list(&ITEMS))),
     }
 }
 
@@ -146,6 +159,37 @@ fn bare_feature(text: &str, at: usize) -> Option<Slip> {
         Some(meant) => slip.fix(format!("did you mean `{meant}`?"), start, name.len(), meant),
         None => slip.suggest(format!("did you mean `add {name}`?"), start, 0, "add "),
     })
+}
+
+/// `fillet edge r = 2`: a statement of other languages, at the beginning of a line.
+fn foreign_statement(text: &str, at: usize) -> Option<Slip> {
+    let begins = text[line_start(text, at)..at].trim().is_empty();
+    let found = token_at(text, at);
+    // `round = 1` is a field, and an unknown one is reported with those that there are.
+    let field = text[at + found.len()..].trim_start_matches(' ').starts_with('=');
+    if begins && !field { elsewhere::slip(at, found) } else { None }
+}
+
+/// `units mm`, and `assembly: name {`.
+fn title_line(text: &str, at: usize) -> Option<Slip> {
+    let line = line_start(text, at);
+    let head = &text[line..at];
+    let words: Vec<&str> = head.split_whitespace().collect();
+    match words.as_slice() {
+        ["units", unit] if token_at(text, at).is_empty() => {
+            let angle = matches!(*unit, "deg" | "rad" | "°");
+            let both = if angle { format!("mm {unit}") } else { format!("{unit} deg") };
+            let from = line + head.find(unit)?;
+            let slip = Slip::new("E0101", from, unit.len(), "units are two: of lengths and of angles", "one of them");
+            Some(slip.fix(format!("write `units {both}`"), from, unit.len(), both))
+        }
+        [kind] if text[at..].starts_with(':') && ITEMS.iter().any(|item| item.trim_matches('`') == *kind) => {
+            let slip = Slip::new("E0101", at, 1, format!("no `:` stands behind `{kind}`"), "not expected here");
+            let blanks = text[at + 1..].len() - text[at + 1..].trim_start_matches(' ').len();
+            Some(slip.fix("remove it", at, 1 + blanks, " "))
+        }
+        _ => None,
+    }
 }
 
 /// The word before `at`, if it was read as a unit but is nearly a keyword that is expected.

@@ -1,5 +1,6 @@
 //! Statements in the wrong block, and words in the wrong order.
 
+use super::super::lines::{outside_strings, strip_comment};
 use super::{Slip, is_word, line_start, token_at};
 
 /// Where a statement that stands in the wrong block belongs: first words, block.
@@ -47,10 +48,71 @@ pub fn slip(text: &str, at: usize) -> Option<Slip> {
             if let ("a `part`", Some(slip)) = (*block, bare_name(text, at)) {
                 return Some(slip);
             }
+            // Features stand in groups, too.
+            let around = enclosing(text, at)
+                .map(|around| if ["add", "cut", "keep"].contains(&around) { "part" } else { around });
+            if around.is_some_and(|around| block.split('`').nth(1) == Some(around)) {
+                return Some(malformed(text, at, found));
+            }
             let help = format!("move it into the braces of {block}");
             Some(slip(format!("`{found}` cannot stand here"), "not in this block").help(help))
         }
         _ => None,
+    }
+}
+
+/// The first word of the line whose `{` is open at `at`.
+fn enclosing(text: &str, at: usize) -> Option<&str> {
+    let mut open = Vec::new();
+    let mut start = 0;
+    for line in text[..at].split_inclusive('\n') {
+        for (i, byte) in outside_strings(strip_comment(line)) {
+            match byte {
+                b'{' => open.push(start + i),
+                b'}' => drop(open.pop()),
+                _ => {}
+            }
+        }
+        start += line.len();
+    }
+    let open = open.pop()?;
+    text[line_start(text, open)..open].split_whitespace().next()
+}
+
+/// How the statements of blocks are written.
+const FORMS: [(&str, &str); 15] = [
+    ("add", "add slab = box(x = 40, y = 30, z = 10)"),
+    ("cut", "cut bore = cylinder(d = 6 H7, h = through)"),
+    ("keep", "keep disc = cylinder(d = 40, h = 10)"),
+    ("outline", "outline profile {"),
+    ("root", "root plate"),
+    ("place", "place pin on plate.bore"),
+    ("measure", "measure gap = from plate.slab.top to lid.slab.bottom"),
+    ("camera", "camera fixed {"),
+    ("light", "light room = room(patches = 9)"),
+    ("floor", "floor {"),
+    ("vary", "vary {"),
+    ("watch", "watch pin"),
+    ("from", "from (0, 0)"),
+    ("line", "line to (10, 0)"),
+    ("arc", "arc to (10, 0) radius 5 left"),
+];
+
+/// A statement that stands where it may, and is written otherwise.
+fn malformed(text: &str, at: usize, word: &str) -> Slip {
+    let line = strip_comment(text[at..].lines().next().unwrap_or_default()).trim_end();
+    let slip = Slip::new("E0101", at, line.len(), format!("this `{word}` cannot be read"), "not of its form");
+    let rest = line[word.len()..].trim_start();
+    // `light ring(inner = 30)`
+    let call = rest.split('(').next().unwrap_or_default().trim_end();
+    if let ("light", true, true) = (word, rest.contains('('), is_word(call)) {
+        let slip = Slip::new("E0101", at, line.len(), "a light has a name", "one without");
+        let text = format!("{call} = ");
+        return slip.suggest(format!("write `light {text}{rest}`"), at + line.len() - rest.len(), 0, text);
+    }
+    match FORMS.iter().find(|(of, _)| *of == word) {
+        Some((_, form)) => slip.help(format!("it is written as `{form}`")),
+        None => slip,
     }
 }
 
