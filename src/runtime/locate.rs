@@ -10,6 +10,7 @@ use super::field::Field;
 use super::follow::{EDGE_SIGMA, View, follow};
 use super::grid::Grid;
 use super::model::{Locator, Model, PointGroup, PointSet};
+use super::parts::{Listener, Part, nobody};
 use super::pose::{Installation, Pose};
 use super::settle;
 
@@ -145,7 +146,20 @@ impl Search {
 
     /// The best pose within `standing` (ranges of x, y, z, rz), or `None` when there is nothing to go by.
     pub fn locate(&self, fields: &Fields, camera: &Camera, standing: &[[f64; 2]; 4]) -> Option<Located> {
+        self.locate_heard(fields, camera, standing, &nobody)
+    }
+
+    /// The same, with the parts of it told.
+    pub(super) fn locate_heard(
+        &self,
+        fields: &Fields,
+        camera: &Camera,
+        standing: &[[f64; 2]; 4],
+        listener: &Listener,
+    ) -> Option<Located> {
+        listener(Part::Poses);
         let candidates = self.coarse(fields, &camera.reduced(self.coarse_factor), standing);
+        listener(Part::Edges);
         let fine = Level::new(&fields.fine, camera, self.fine_factor);
         let followed = |pose: Pose, effort: Effort| {
             let pose = self.refine(&fine, pose, standing, effort);
