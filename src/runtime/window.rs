@@ -55,8 +55,8 @@ impl Window {
     /// Where the pixels lie in a photo by `camera` of an assembly at `pose`.
     pub fn place(&self, camera: &Camera, pose: &Pose) -> Placed {
         let camera = camera.reduced(self.frame.factor);
-        let outside = [f64::NEG_INFINITY; 2];
-        Placed(self.points.iter().map(|&p| camera.project(pose.apply(p)).unwrap_or(outside)).collect())
+        let (stood, outside) = (pose.stood(), [f64::NEG_INFINITY; 2]);
+        Placed(self.points.iter().map(|&p| camera.project(stood.apply(p)).unwrap_or(outside)).collect())
     }
 
     /// The node's image from a photo already reduced by the node's factor, moved by `shift` (node px). The second value is the
