@@ -31,7 +31,7 @@ pub struct Global {
     /// How diagnostics are written.
     #[arg(long, global = true, value_name = "FORMAT", default_value = "human")]
     pub message_format: MessageFormat,
-    /// Print the seconds every stage took.
+    /// Print the time every stage, or every part of judging, took.
     #[arg(long, global = true)]
     pub timings: bool,
 }

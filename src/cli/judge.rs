@@ -1,11 +1,12 @@
 //! `gonogo calibrate` and `gonogo inspect`: models, calibrations and photos from files, verdicts to standard output.
 
 use super::Exit;
-use super::args::{Calibrate, Inspect, VerdictFormat};
+use super::args::{Calibrate, Global, Inspect, VerdictFormat};
 use super::output::{self, DASH, Failure};
 use super::overlay;
 use super::photos::{self, End, Watch};
 use super::rig;
+use super::timings::Stopwatch;
 use super::verdict::{self, Outcome};
 use crate::runtime::calibrate::{self, Calibration};
 use crate::runtime::inspect::{Decision, Finding, Inspector};
@@ -49,18 +50,24 @@ pub fn warn_of(doubt: &Finding) {
 }
 
 /// Judges photos one after the other. A photo that cannot be read is a verdict of its own and stops nothing.
-pub fn inspect(args: &Inspect) -> Result<Exit, Failure> {
+pub fn inspect(args: &Inspect, global: &Global) -> Result<Exit, Failure> {
     let text = output::read_text(&args.model)?;
     if is_rig(&text) {
-        return rig::inspect(args, &text);
+        return rig::inspect(args, &text, global);
     }
     let model = model_of(&args.model, &text)?;
     let calibration = calibration(args.calibration.as_deref(), &model)?;
     let listed = photos::listed(&args.photos)?;
     let overlays = args.overlay.as_deref().map(|dir| Overlays::new(dir, &listed)).transpose()?;
     let watch = args.watch.as_deref().map(Watch::new).transpose()?;
-    let inspector = inspector(&model, &calibration)?;
-    let mut desk = Desk { inspector, format: args.format, overlays, outcomes: Vec::new(), worst: None };
+    let stopwatch = Stopwatch::new(global);
+    let listener = |part| stopwatch.note(part);
+    let mut inspector = inspector(&model, &calibration)?;
+    if stopwatch.is_on {
+        inspector = inspector.heard_by(&listener);
+    }
+    let stopwatch = &stopwatch;
+    let mut desk = Desk { inspector, stopwatch, format: args.format, overlays, outcomes: Vec::new(), worst: None };
     for path in &listed {
         if path == Path::new(DASH) {
             photos::standard_input(|name, bytes| desk.take(name, bytes.map_or_else(|| output::read_file(name), Ok)))?;
@@ -76,12 +83,14 @@ pub fn inspect(args: &Inspect) -> Result<Exit, Failure> {
         let name = format!("{}.{}", model.assembly, model.station.name);
         output::line(&verdict::junit(&name, &verdict::watched(&model), &desk.outcomes))?;
     }
+    stopwatch.finish();
     Ok(desk.worst.unwrap_or(Exit::Trouble))
 }
 
 /// Where photos are judged and verdicts written.
 struct Desk<'a> {
     inspector: Inspector<'a>,
+    stopwatch: &'a Stopwatch,
     format: VerdictFormat,
     overlays: Option<Overlays>,
     /// For the one report at the end.
@@ -103,8 +112,9 @@ impl Desk<'_> {
 
     /// Judges a photo, unless it is none yet and there is time to wait.
     fn take_if_complete(&mut self, path: &Path, bytes: Vec<u8>, patient: bool) -> Result<bool, Failure> {
-        let (start, photo) = (Instant::now(), decode(&self.inspector, &bytes));
+        let (start, photo) = (Instant::now(), self.inspector.photo(&bytes));
         if patient && matches!(photo, Err(PhotoError::Unreadable(_))) {
+            self.stopwatch.lap();
             return Ok(false);
         }
         let outcome = judged(&self.inspector, path.display().to_string(), photo, start);
@@ -113,6 +123,7 @@ impl Desk<'_> {
     }
 
     fn put(&mut self, path: &Path, outcome: Outcome, bytes: Option<&[u8]>) -> Result<(), Failure> {
+        let (spent, name) = (self.stopwatch.lap(), outcome.photo.clone());
         if let (Some(overlays), Some(bytes)) = (&mut self.overlays, bytes) {
             overlays.admit(path)?;
             write_overlay(&overlays.dir, path, bytes, &outcome)?;
@@ -125,7 +136,8 @@ impl Desk<'_> {
                 self.outcomes.push(outcome);
                 Ok(())
             }
-        }
+        }?;
+        self.stopwatch.tell(&name, spent)
     }
 }
 
@@ -149,12 +161,7 @@ pub fn judge(inspector: &Inspector, path: &Path) -> (Outcome, Option<Vec<u8>>) {
 
 fn judge_bytes(inspector: &Inspector, name: String, bytes: &[u8]) -> Outcome {
     let start = Instant::now();
-    judged(inspector, name, decode(inspector, bytes), start)
-}
-
-fn decode(inspector: &Inspector, bytes: &[u8]) -> Result<Photo, PhotoError> {
-    let station = &inspector.model().station;
-    Photo::decode(bytes, station.tone, station.camera.size)
+    judged(inspector, name, inspector.photo(bytes), start)
 }
 
 fn judged(inspector: &Inspector, name: String, photo: Result<Photo, PhotoError>, start: Instant) -> Outcome {

@@ -29,6 +29,7 @@ pub mod report {
 mod report_page;
 mod rig;
 mod shells;
+mod timings;
 mod verdict;
 mod watch;
 
@@ -70,7 +71,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Command::Check(args) => compile::check(args, global),
         Command::Fmt(args) => format::format(args, global),
         Command::Calibrate(args) => judge::calibrate(args),
-        Command::Inspect(args) => judge::inspect(args),
+        Command::Inspect(args) => judge::inspect(args, global),
         Command::Report(args) => report_page::report(args, global),
         Command::Prove(args) => prove::prove(args, global),
         Command::Explain(args) => explain(args),

@@ -3,10 +3,11 @@
 //! In: a rig, photos by camera from files and folders. Out: one verdict an assembly. Photos of one assembly are paired in the
 //! order given, those of folders by their names; what has no partner is refused before anything is judged.
 
-use super::args::{Calibrate, Inspect, VerdictFormat};
+use super::args::{Calibrate, Global, Inspect, VerdictFormat};
 use super::judge::{self, Overlays, coded, exit_of};
 use super::output::{self, DASH, Failure};
 use super::photos::{self, End, Watch};
+use super::timings::Stopwatch;
 use super::verdict::{self, Outcome};
 use super::{Exit, compile};
 use crate::diag::suggest::nearest;
@@ -50,7 +51,7 @@ pub fn calibrate(args: &Calibrate, text: &str) -> Result<Exit, Failure> {
 }
 
 /// Judges assemblies one after the other. A photo that cannot be read makes a verdict of its own and stops nothing.
-pub fn inspect(args: &Inspect, text: &str) -> Result<Exit, Failure> {
+pub fn inspect(args: &Inspect, text: &str, global: &Global) -> Result<Exit, Failure> {
     let rig = read(&args.model, text)?;
     let calibration = calibration(args.calibration.as_deref(), &rig)?;
     let listed = assemblies(&rig, &args.photos)?;
@@ -58,8 +59,14 @@ pub fn inspect(args: &Inspect, text: &str) -> Result<Exit, Failure> {
     let watched = |dir: &Path| rig.names().into_iter().map(|name| Watch::new(&dir.join(name))).collect();
     let watches: Option<Vec<Watch>> = args.watch.as_deref().map(watched).transpose()?;
     let unusable = || Failure("E0803: a camera cannot see the nodes of its model: compile the spec again".into());
-    let inspector = RigInspector::new(&rig, &calibration).ok_or_else(unusable)?;
-    let mut desk = Desk { inspector, format: args.format, overlays, outcomes: Vec::new(), worst: None };
+    let stopwatch = Stopwatch::new(global);
+    let listener = |part| stopwatch.note(part);
+    let mut inspector = RigInspector::new(&rig, &calibration).ok_or_else(unusable)?;
+    if stopwatch.is_on {
+        inspector = inspector.heard_by(&listener);
+    }
+    let stopwatch = &stopwatch;
+    let mut desk = Desk { inspector, stopwatch, format: args.format, overlays, outcomes: Vec::new(), worst: None };
     for photos in &listed {
         desk.take(photos, photos.iter().map(|path| output::read_file(path)).collect())?;
     }
@@ -72,6 +79,7 @@ pub fn inspect(args: &Inspect, text: &str) -> Result<Exit, Failure> {
         let components: Vec<String> = rig.components.iter().map(|c| c.name.clone()).collect();
         output::line(&verdict::junit(&name, &components, &desk.outcomes))?;
     }
+    stopwatch.finish();
     Ok(desk.worst.unwrap_or(Exit::Trouble))
 }
 
@@ -200,6 +208,7 @@ fn in_folders(folders: &[PathBuf]) -> Result<Vec<Vec<PathBuf>>, Failure> {
 /// Where assemblies are judged and verdicts written.
 struct Desk<'a> {
     inspector: RigInspector<'a>,
+    stopwatch: &'a Stopwatch,
     format: VerdictFormat,
     /// One a camera.
     overlays: Option<Vec<Overlays>>,
@@ -232,6 +241,7 @@ impl Desk<'_> {
         };
         let photos: Vec<Option<Result<Photo, PhotoError>>> = found.iter().enumerate().map(decode).collect();
         if patient && photos.iter().any(|photo| matches!(photo, Some(Err(PhotoError::Unreadable(_))))) {
+            self.stopwatch.lap();
             return Ok(false);
         }
         let photos: Vec<Result<Photo, String>> = photos
@@ -247,8 +257,7 @@ impl Desk<'_> {
     }
 
     fn decode(&self, camera: usize, bytes: &[u8]) -> Result<Photo, PhotoError> {
-        let station = &self.inspector.rig().cameras[camera].station;
-        Photo::decode(bytes, station.tone, station.camera.size)
+        self.inspector.photo(camera, bytes)
     }
 
     fn judge(
@@ -259,6 +268,7 @@ impl Desk<'_> {
         start: Instant,
     ) -> Result<(), Failure> {
         let verdict = self.inspector.inspect(photos);
+        let spent = self.stopwatch.lap();
         let cameras = self.inspector.rig().names().into_iter().map(str::to_string);
         let outcome = RigOutcome {
             photos: cameras.zip(names.iter().cloned()).collect(),
@@ -284,6 +294,7 @@ impl Desk<'_> {
                 self.outcomes.push(joint);
                 Ok(())
             }
-        }
+        }?;
+        self.stopwatch.tell(&names.join(" + "), spent)
     }
 }

@@ -33,35 +33,37 @@ pub(super) struct View<'a> {
 }
 
 impl View<'_> {
-    pub(super) fn pulls(
+    /// `seen_at` tells for parameters where points are seen.
+    pub(super) fn pulls<Seen: Fn(&EdgePoint) -> Option<[f64; 2]>>(
         &self,
         points: &[(EdgePoint, f64)],
         reach: f64,
         parameters: &[f64],
-        project: impl Fn(&[f64], &EdgePoint) -> Option<[f64; 2]>,
+        seen_at: impl Fn(&[f64]) -> Seen,
         pose: &Pose,
-        camera: &Camera,
     ) -> Vec<Pull> {
-        debug_assert!(std::ptr::eq(self.camera, camera));
+        /// Small against every parameter's range, large against rounding: mm, rad or shares.
+        const STEP: f64 = 1e-5;
+        let stood = pose.stood();
+        let seen = seen_at(parameters);
+        let step = |i: usize| {
+            let mut moved = parameters.to_vec();
+            moved[i] += STEP;
+            seen_at(&moved)
+        };
+        let seen_moved: Vec<Seen> = (0..parameters.len()).map(step).collect();
         points
             .iter()
             .filter_map(|(point, trust)| {
-                let (at, direction) = point.seen(self.camera, pose)?;
+                let (at, direction) = point.seen_as(self.camera, &stood)?;
                 let (distance, agreement) = self.field.nearest_edge(at, direction, reach)?;
                 if agreement <= LEAST_AGREEMENT {
                     return None;
                 }
                 let along = |p: [f64; 2]| p[0] * f64::from(direction[0]) + p[1] * f64::from(direction[1]);
-                let here = along(project(parameters, point)?);
-                let mut gradient = Vec::with_capacity(parameters.len());
-                let mut moved = parameters.to_vec();
-                for i in 0..parameters.len() {
-                    /// Small against every parameter's range, large against rounding: mm, rad or shares.
-                    const STEP: f64 = 1e-5;
-                    moved[i] += STEP;
-                    gradient.push((along(project(&moved, point)?) - here) / STEP);
-                    moved[i] = parameters[i];
-                }
+                let here = along(seen(point)?);
+                let slope = |moved: &Seen| Some((along(moved(point)?) - here) / STEP);
+                let gradient = seen_moved.iter().map(slope).collect::<Option<Vec<f64>>>()?;
                 let robust = 1.0 / (1.0 + (distance / ROBUST_SCALE).powi(2));
                 Some(Pull { distance, gradient, weight: f64::from(agreement) * robust * trust })
             })

@@ -12,7 +12,8 @@ use super::light::Light;
 use super::locate::{Located, Search};
 use super::look::Look;
 use super::model::{Model, Node};
-use super::photo::Photo;
+use super::parts::{Listener, Part, nobody};
+use super::photo::{Photo, PhotoError};
 use super::pose::Pose;
 use super::settle::{self, Expected};
 use super::strange::{self, Unlikeness};
@@ -104,6 +105,7 @@ pub struct Inspector<'a> {
     calibrated: Vec<Option<Unlikeness>>,
     /// Where calibration expects the nodes; `None` before there is any.
     expected: Option<Vec<Expected>>,
+    listener: &'a Listener<'a>,
 }
 
 impl<'a> Inspector<'a> {
@@ -127,7 +129,25 @@ impl<'a> Inspector<'a> {
         let camera = calibration.installation.apply(&model.station.camera);
         let search = Search::new(&model);
         let expected = expected(&model, &calibration);
-        Some(Inspector { model, calibration, camera, search, prepared, light, densities, calibrated, expected })
+        let listener = &nobody;
+        Some(Inspector {
+            model,
+            calibration,
+            camera,
+            search,
+            prepared,
+            light,
+            densities,
+            calibrated,
+            expected,
+            listener,
+        })
+    }
+
+    /// The same, telling the parts of its work.
+    #[must_use]
+    pub fn heard_by(self, listener: &'a Listener<'a>) -> Inspector<'a> {
+        Inspector { listener, ..self }
     }
 
     pub fn model(&self) -> &Model {
@@ -139,16 +159,28 @@ impl<'a> Inspector<'a> {
         &self.calibrated
     }
 
+    /// Decodes a photo of the station.
+    pub fn photo(&self, bytes: &[u8]) -> Result<Photo, PhotoError> {
+        let station = &self.model.station;
+        Photo::decode_heard(bytes, station.tone, station.camera.size, self.listener)
+    }
+
     /// Judges one photo.
     pub fn inspect(&self, photo: &Photo) -> Verdict {
+        (self.listener)(Part::Light);
         let photo = &*photo.flattened(self.model.station.vignetting);
-        let fields = self.search.fields(&photo.light, self.calibration.noise);
-        let located = self.search.locate(&fields, &self.camera, &widened(&self.model));
+        let located = self.locate(&self.search, photo);
         let least = self.least_score();
         match located {
             Some(found) if found.score >= least => self.judge(photo, found),
             found => self.judge_without(photo, least).unwrap_or_else(|| not_found(found, least)),
         }
+    }
+
+    fn locate(&self, search: &Search, photo: &Photo) -> Option<Located> {
+        (self.listener)(Part::Fields);
+        let fields = search.fields(&photo.light, self.calibration.noise);
+        search.locate_heard(&fields, &self.camera, &widened(&self.model), self.listener)
     }
 
     /// The verdict on an assembly that is found only when the edges of one component are not looked for, if that
@@ -160,8 +192,7 @@ impl<'a> Inspector<'a> {
         }
         let attempt = |group: usize| -> Option<Verdict> {
             let search = Search::without(&self.model, Some(group));
-            let fields = search.fields(&photo.light, self.calibration.noise);
-            let found = search.locate(&fields, &self.camera, &widened(&self.model))?;
+            let found = self.locate(&search, photo)?;
             let verdict = (found.score >= least).then(|| self.judge(photo, found))?;
             let blamed = verdict.findings.iter().any(|f| f.component == locator.groups[group].name);
             blamed.then_some(verdict)
@@ -178,11 +209,15 @@ impl<'a> Inspector<'a> {
 
     fn judge(&self, photo: &Photo, found: Located) -> Verdict {
         let evidence = self.evidence(photo, &found.pose);
+        (self.listener)(Part::Verdict);
         let mut nodes: Vec<NodeReport> =
             (0..evidence.len()).map(|i| self.report(i, &evidence[i], &found.pose)).collect();
+        (self.listener)(Part::Unknown);
         strange::weigh(&mut nodes, &self.model.nodes, &self.calibrated);
+        (self.listener)(Part::Explain);
         let disturbed = self.disturbed(&nodes, photo, &found.pose);
         let order = self.blame(&mut nodes, &evidence, &disturbed);
+        (self.listener)(Part::Verdict);
         let mut findings: Vec<Finding> = order.iter().map(|&i| self.finding(i, &nodes[i])).collect();
         let hidden = nodes.iter().find(|n| n.inside < LEAST_INSIDE);
         if findings.is_empty() && hidden.is_none() {
@@ -224,10 +259,11 @@ impl<'a> Inspector<'a> {
 
     /// Every node at a pose under its own hypotheses.
     fn looks(&self, photo: &Photo, pose: &Pose) -> Vec<Look<'_>> {
+        (self.listener)(Part::Windows);
         let pyramid = self.prepared.pyramid(&photo.light);
         let look = |(i, node): (usize, &NodeImages)| {
             let reduced = pyramid.at(node.window.frame.factor);
-            node.look(&self.densities[i][..node.own], &self.light, reduced, &self.camera, pose)
+            node.look(&self.densities[i][..node.own], &self.light, reduced, &self.camera, pose, self.listener)
         };
         self.prepared.nodes.iter().enumerate().map(look).collect()
     }
@@ -243,7 +279,8 @@ impl<'a> Inspector<'a> {
             let node = &self.prepared.nodes[i];
             let densities = &self.densities[i][node.own..];
             let reduced = pyramid.at(node.window.frame.factor);
-            node.evidence(&node.look(densities, &self.light, reduced, &self.camera, pose), None).log_likelihoods
+            let look = node.look(densities, &self.light, reduced, &self.camera, pose, &nobody);
+            node.evidence(&look, None).log_likelihoods
         };
         (0..nodes.len()).map(|i| if needed(i) { states(i) } else { Vec::new() }).collect()
     }

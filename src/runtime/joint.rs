@@ -13,7 +13,8 @@ use super::calibrate::{self, Calibration, CalibrationError, SLIGHT};
 use super::inspect::{self, Decision, Finding, Inspector, LEAST_INSIDE, NodeReport, Verdict};
 use super::judge::Evidence;
 use super::model::Model;
-use super::photo::Photo;
+use super::parts::{Listener, Part, nobody};
+use super::photo::{Photo, PhotoError};
 use super::report::Outcome;
 use super::rig::{Component, Mode, Rig, RigCalibration, Seen, camera_name, hypotheses};
 use super::strange;
@@ -39,6 +40,7 @@ pub struct RigVerdict {
 pub struct RigInspector<'a> {
     rig: Cow<'a, Rig>,
     inspectors: Vec<Inspector<'a>>,
+    listener: &'a Listener<'a>,
 }
 
 /// A component by all that is left of the cameras.
@@ -159,7 +161,7 @@ impl<'a> RigInspector<'a> {
     pub fn owned(rig: Rig, calibration: RigCalibration) -> Option<RigInspector<'static>> {
         let pairs = rig.cameras.iter().cloned().zip(calibration.cameras);
         let inspectors = pairs.map(|(model, own)| Inspector::owned(model, own)).collect::<Option<_>>()?;
-        Some(RigInspector { rig: Cow::Owned(rig), inspectors })
+        Some(RigInspector { rig: Cow::Owned(rig), inspectors, listener: &nobody })
     }
 
     fn of<'b>(
@@ -167,11 +169,26 @@ impl<'a> RigInspector<'a> {
         pairs: impl Iterator<Item = (&'b Model, &'b Calibration)>,
     ) -> Option<RigInspector<'b>> {
         let inspectors = pairs.map(|(model, own)| Inspector::new(model, own)).collect::<Option<_>>()?;
-        Some(RigInspector { rig, inspectors })
+        Some(RigInspector { rig, inspectors, listener: &nobody })
+    }
+
+    /// The same, telling the parts of its work.
+    #[must_use]
+    pub fn heard_by(self, listener: &'a Listener<'a>) -> RigInspector<'a> {
+        let inspectors = self.inspectors.into_iter().map(|inspector| inspector.heard_by(listener)).collect();
+        RigInspector { inspectors, listener, ..self }
     }
 
     pub fn rig(&self) -> &Rig {
         &self.rig
+    }
+
+    /// Decodes a photo by a camera (its number in [`Rig::names`]).
+    ///
+    /// # Panics
+    /// When there is no such camera.
+    pub fn photo(&self, camera: usize, bytes: &[u8]) -> Result<Photo, PhotoError> {
+        self.inspectors[camera].photo(bytes)
     }
 
     /// Judges one assembly by one photo a camera, in the order of [`Rig::names`]; where there is none, why not.
@@ -184,10 +201,12 @@ impl<'a> RigInspector<'a> {
             Err(why) => Outcome::unreadable(String::new(), why.clone()).verdict,
         };
         let mut views: Vec<Verdict> = self.inspectors.iter().zip(&photos).map(look).collect();
+        (self.listener)(Part::Explain);
         let seen: Vec<&Verdict> = views.iter().collect();
         let weighed = |c: &Component| weigh(c, &self.rig.cameras, &seen, &|_| true);
         let components: Vec<Weighed> = self.rig.components.iter().map(weighed).collect();
         let blamed = self.blame(&components, &seen, &photos);
+        (self.listener)(Part::Verdict);
         let (findings, seen_by) = blamed.iter().map(|&i| self.finding(i, &components[i], &seen)).unzip();
         let joint = self.joint(&components, &seen, &blamed, findings);
         views.iter_mut().enumerate().for_each(|(camera, view)| self.mark(camera, view, &components, &joint));

@@ -8,6 +8,7 @@ use super::grid::Grid;
 use super::light::{Light, LightEvidence};
 use super::look::{Look, Shifted};
 use super::model::{Image, Model, Node};
+use super::parts::{Listener, Part, nobody};
 use super::pose::Pose;
 use super::settle::Expected;
 use super::strange::Unlikeness;
@@ -175,14 +176,16 @@ impl NodeImages {
         reduced: &Grid,
         camera: &Camera,
         pose: &Pose,
+        listener: &'a Listener<'a>,
     ) -> Look<'a> {
+        listener(Part::Windows);
         let placed = self.window.place(camera, pose);
         let inside = self.window.cut(reduced, &placed, [0.0, 0.0]).1;
         let coefficients = |shift: [f64; 2]| {
             let (image, _) = self.window.cut(reduced, &placed, shift);
             self.stencil.coefficients(&light.level(image, &self.surroundings))
         };
-        Look::new(densities, self.spread, self.window.frame.factor, inside, &coefficients)
+        Look::new(densities, self.spread, self.window.frame.factor, inside, &coefficients, listener)
     }
 
     /// Evidence for each density of a look; each re-aligns by itself within the local search. The first one's place is known as
@@ -195,6 +198,7 @@ impl NodeImages {
         let good = expected.map_or_else(|| look.likeliest(0, &free, 1.0), |e| look.likeliest(0, e, weight));
         let others = (1..look.densities.len()).map(|density| look.likeliest(density, &free, 1.0).0);
         let Shifted { shift, ref coefficients } = look.shifted[good.1];
+        (look.listener)(Part::Unknown);
         let unlike = self.stencil.highest_means(&look.densities[0].surprise(coefficients));
         let log_likelihoods = std::iter::once(good.0).chain(others).collect();
         Evidence { log_likelihoods, inside: look.inside, shift, unlike }
@@ -209,7 +213,7 @@ impl NodeImages {
         camera: &Camera,
         pose: &Pose,
     ) -> [f64; 2] {
-        self.look(std::slice::from_ref(density), light, reduced, camera, pose).best_shift()
+        self.look(std::slice::from_ref(density), light, reduced, camera, pose, &nobody).best_shift()
     }
 
     /// The node's window in a photo of a correct assembly at its most likely shift, and the shift in px of the photo.

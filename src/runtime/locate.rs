@@ -10,7 +10,8 @@ use super::field::Field;
 use super::follow::{EDGE_SIGMA, View, follow};
 use super::grid::Grid;
 use super::model::{Locator, Model, PointGroup, PointSet};
-use super::pose::{Installation, Pose};
+use super::parts::{Listener, Part, nobody};
+use super::pose::{Installation, Pose, Stood};
 use super::settle;
 
 /// How many coarse poses are followed, quickly, and how many of them to the end.
@@ -50,8 +51,13 @@ impl EdgePoint {
 
     /// Place in the field's px and the direction in which light grows there.
     pub fn seen(&self, camera: &Camera, pose: &Pose) -> Option<([f64; 2], [f32; 2])> {
-        let p = camera.project(pose.apply(self.at))?;
-        let q = camera.project(pose.apply(self.along))?;
+        self.seen_as(camera, &pose.stood())
+    }
+
+    /// The same of an assembly that stands so.
+    pub(super) fn seen_as(&self, camera: &Camera, stood: &Stood) -> Option<([f64; 2], [f32; 2])> {
+        let p = camera.project(stood.apply(self.at))?;
+        let q = camera.project(stood.apply(self.along))?;
         let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
         let length = (dx * dx + dy * dy).sqrt();
         (length > 1e-9).then(|| (p, [(-dy / length) as f32, (dx / length) as f32]))
@@ -145,7 +151,20 @@ impl Search {
 
     /// The best pose within `standing` (ranges of x, y, z, rz), or `None` when there is nothing to go by.
     pub fn locate(&self, fields: &Fields, camera: &Camera, standing: &[[f64; 2]; 4]) -> Option<Located> {
+        self.locate_heard(fields, camera, standing, &nobody)
+    }
+
+    /// The same, with the parts of it told.
+    pub(super) fn locate_heard(
+        &self,
+        fields: &Fields,
+        camera: &Camera,
+        standing: &[[f64; 2]; 4],
+        listener: &Listener,
+    ) -> Option<Located> {
+        listener(Part::Poses);
         let candidates = self.coarse(fields, &camera.reduced(self.coarse_factor), standing);
+        listener(Part::Edges);
         let fine = Level::new(&fields.fine, camera, self.fine_factor);
         let followed = |pose: Pose, effort: Effort| {
             let pose = self.refine(&fine, pose, standing, effort);
@@ -255,12 +274,15 @@ impl Search {
         let base = Pose { x: axes[0][0], y: axes[1][0], z, rz };
         let (dx, dy) = (axes[0][axes[0].len() - 1] - base.x, axes[1][axes[1].len() - 1] - base.y);
         let (dx, dy) = (dx.max(1e-6), dy.max(1e-6));
+        let middle = Pose { x: base.x + dx / 2.0, y: base.y + dy / 2.0, ..base }.stood();
+        let right = Pose { x: base.x + dx, ..base }.stood();
+        let up = Pose { y: base.y + dy, ..base }.stood();
+        let base = base.stood();
         let place = |point: &EdgePoint| -> Option<SheetPoint> {
-            let middle = Pose { x: base.x + dx / 2.0, y: base.y + dy / 2.0, ..base };
-            let (_, direction) = point.seen(camera, &middle)?;
+            let (_, direction) = point.seen_as(camera, &middle)?;
             let at = camera.project(base.apply(point.at))?;
-            let right = camera.project(Pose { x: base.x + dx, ..base }.apply(point.at))?;
-            let up = camera.project(Pose { y: base.y + dy, ..base }.apply(point.at))?;
+            let right = camera.project(right.apply(point.at))?;
+            let up = camera.project(up.apply(point.at))?;
             let per = |q: [f64; 2], d: f64| [(q[0] - at[0]) / d, (q[1] - at[1]) / d];
             Some(SheetPoint { at, per_x: per(right, dx), per_y: per(up, dy), direction })
         };
@@ -286,8 +308,13 @@ impl Search {
     fn chosen(&self, field: &Field, camera: &Camera, pose: &Pose, factor: u32, stride: usize) -> Vec<(EdgePoint, f64)> {
         let clear = |a: &Alternative| agreement(field, camera, pose, a) / (a.fine.len().max(1) as f64).sqrt();
         let best = |(group, play): (&Vec<Alternative>, &f64)| {
-            let scored = group.iter().map(|a| (clear(a), a));
-            let points = scored.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(&[][..], |(_, a)| &a.fine);
+            // Where there is no choice nothing is compared.
+            let points = if let [only] = &group[..] {
+                &only.fine[..]
+            } else {
+                let scored = group.iter().map(|a| (clear(a), a));
+                scored.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(&[][..], |(_, a)| &a.fine)
+            };
             let noise = EDGE_SIGMA * f64::from(factor);
             let weight = 1.0 / (1.0 + points.len() as f64 * (play / noise).powi(2));
             points.iter().step_by(stride).map(|&p| (p, weight)).collect::<Vec<_>>()
@@ -310,7 +337,11 @@ impl Search {
         let parameters = follow(vec![0.0; free.len()], &spread, effort.rounds, |parameters, reach| {
             let pose = with(parameters);
             let points = self.chosen(field, camera, &pose, factor, effort.stride);
-            view.pulls(&points, reach, parameters, |p, point| camera.project(with(p).apply(point.at)), &pose, camera)
+            let seen_at = |p: &[f64]| {
+                let stood = with(p).stood();
+                move |point: &EdgePoint| camera.project(stood.apply(point.at))
+            };
+            view.pulls(&points, reach, parameters, seen_at, &pose)
         });
         let mut array = with(&parameters).to_array();
         for (value, [low, high]) in array.iter_mut().zip(standing) {
@@ -351,11 +382,12 @@ impl Search {
                     let camera = installation.apply(nominal).reduced(factor);
                     let points = self.chosen(field(fields), &camera, &pose, factor, FULL.stride);
                     let view = View { field: field(fields), camera: &camera };
-                    let project = |p: &[f64], point: &EdgePoint| {
+                    let seen_at = |p: &[f64]| {
                         let (installation, pose) = split(p, photo);
-                        installation.apply(nominal).reduced(factor).project(pose.apply(point.at))
+                        let (camera, stood) = (installation.apply(nominal).reduced(factor), pose.stood());
+                        move |point: &EdgePoint| camera.project(stood.apply(point.at))
                     };
-                    all.extend(view.pulls(&points, reach, parameters, project, &pose, &camera));
+                    all.extend(view.pulls(&points, reach, parameters, seen_at, &pose));
                 }
                 all
             })
@@ -398,7 +430,8 @@ impl Sheet {
 
 /// Sum of the agreements of an alternative's fine points.
 fn agreement(field: &Field, camera: &Camera, pose: &Pose, alternative: &Alternative) -> f64 {
-    let seen = alternative.fine.iter().filter_map(|p| p.seen(camera, pose));
+    let stood = pose.stood();
+    let seen = alternative.fine.iter().filter_map(|p| p.seen_as(camera, &stood));
     seen.map(|(at, direction)| f64::from(field.agreement(at, direction))).sum()
 }
 

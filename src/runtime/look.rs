@@ -4,6 +4,7 @@
 //! known of the place. Whole px of the photo come first; only round the best of each density half px follow. Never decides.
 
 use super::density::Density;
+use super::parts::{Listener, Part};
 use super::settle::Expected;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -35,6 +36,7 @@ pub struct Look<'a> {
     /// Standard deviation of the place before anything is known of this photo's station (px of the photo).
     spread: [f64; 2],
     factor: f64,
+    pub(super) listener: &'a Listener<'a>,
 }
 
 impl<'a> Look<'a> {
@@ -45,7 +47,9 @@ impl<'a> Look<'a> {
         factor: u32,
         inside: f64,
         coefficients: &dyn Fn([f64; 2]) -> Vec<f32>,
+        listener: &'a Listener<'a>,
     ) -> Look<'a> {
+        listener(Part::Windows);
         let factor = f64::from(factor);
         let spread = spread.map(|s| s * factor);
         let [columns, rows] = spread.map(|spread| steps(spread, factor));
@@ -53,7 +57,8 @@ impl<'a> Look<'a> {
         let shifted = whole.map(|halves| seen(halves, factor, coefficients)).collect();
         let fits = vec![Vec::new(); densities.len()];
         let robust = RefCell::default();
-        let mut look = Look { densities, shifted, fits, robust, inside, spread, factor };
+        let mut look = Look { densities, shifted, fits, robust, inside, spread, factor, listener };
+        listener(Part::Shifts);
         // One density at a time: it is read again and again and should stay near.
         for density in 0..densities.len() {
             (0..look.shifted.len()).for_each(|i| look.fit(density, i));
@@ -71,7 +76,9 @@ impl<'a> Look<'a> {
             for halves in self.round_best(density) {
                 let index = *taken.entry(halves).or_insert(self.shifted.len());
                 if index == self.shifted.len() {
+                    (self.listener)(Part::Windows);
                     self.shifted.push(seen(halves, self.factor, coefficients));
+                    (self.listener)(Part::Shifts);
                 }
                 if density > 0 {
                     self.fit(density, index);
@@ -108,6 +115,7 @@ impl<'a> Look<'a> {
 
     /// Log-likelihood and index of the shift at which a density fits best; `weight` is that of the place beside the image.
     pub(super) fn likeliest(&self, density: usize, expected: &Expected, weight: f64) -> (f64, usize) {
+        (self.listener)(Part::Likelihood);
         let prior = |i: usize| weight * self.prior(i, expected);
         let mut quick: Vec<(f64, usize)> = self.fits[density].iter().map(|&(i, fit)| (fit + prior(i), i)).collect();
         quick.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));

@@ -19,6 +19,7 @@ pub mod locate;
 mod look;
 mod math;
 pub mod model;
+pub mod parts;
 pub mod photo;
 pub mod pose;
 pub mod report;

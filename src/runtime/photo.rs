@@ -5,6 +5,7 @@
 use super::camera::let_through;
 use super::grid::Grid;
 use super::math::power_f32;
+use super::parts::{Listener, Part, nobody};
 use image::metadata::Orientation;
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use serde::{Deserialize, Serialize};
@@ -60,6 +61,12 @@ impl Photo {
     /// alpha is passed over. A file that says how the camera was held (EXIF) is turned upright, as every viewer shows it. The size
     /// is compared before anything is allocated for the pixels.
     pub fn decode(bytes: &[u8], tone: Tone, size: [u32; 2]) -> Result<Photo, PhotoError> {
+        Photo::decode_heard(bytes, tone, size, &nobody)
+    }
+
+    /// The same, with the parts of it told.
+    pub fn decode_heard(bytes: &[u8], tone: Tone, size: [u32; 2], listener: &Listener) -> Result<Photo, PhotoError> {
+        listener(Part::Decode);
         let unreadable = |e: ImageError| PhotoError::Unreadable(plain(&e));
         let mut limits = limits();
         let mut reader = ImageReader::new(Cursor::new(bytes));
@@ -88,6 +95,7 @@ impl Photo {
         decoder.set_limits(limits).map_err(unreadable)?;
         let mut decoded = DynamicImage::from_decoder(decoder).map_err(unreadable)?;
         decoded.apply_orientation(held);
+        listener(Part::Light);
         let light = light(&decoded, tone).ok_or_else(|| {
             PhotoError::Unreadable("its pixels are floating-point numbers: 8 or 16 bits are expected".into())
         })?;

@@ -31,8 +31,12 @@ impl Pose {
 
     /// Assembly frame to station frame.
     pub fn apply(&self, p: Vec3) -> Vec3 {
-        let (s, c) = sin_cos(self.rz);
-        [c * p[0] - s * p[1] + self.x, s * p[0] + c * p[1] + self.y, p[2] + self.z]
+        self.stood().apply(p)
+    }
+
+    /// The pose with its turn worked out, for many points.
+    pub fn stood(&self) -> Stood {
+        Stood { pose: *self, turn: sin_cos(self.rz) }
     }
 
     /// Station frame to assembly frame.
@@ -40,6 +44,22 @@ impl Pose {
         let (s, c) = sin_cos(self.rz);
         let [x, y] = [p[0] - self.x, p[1] - self.y];
         [c * x + s * y, -s * x + c * y, p[2] - self.z]
+    }
+}
+
+/// An assembly that stands somewhere.
+#[derive(Debug, Clone, Copy)]
+pub struct Stood {
+    pose: Pose,
+    /// Sine and cosine.
+    turn: (f64, f64),
+}
+
+impl Stood {
+    /// Assembly frame to station frame.
+    pub fn apply(&self, p: Vec3) -> Vec3 {
+        let (Pose { x, y, z, .. }, (s, c)) = (self.pose, self.turn);
+        [c * p[0] - s * p[1] + x, s * p[0] + c * p[1] + y, p[2] + z]
     }
 }
 

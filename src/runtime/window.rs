@@ -63,9 +63,9 @@ impl Window {
     /// Where the pixels lie in a photo by `camera` of an assembly at `pose`.
     pub fn place(&self, camera: &Camera, pose: &Pose) -> Placed {
         let camera = camera.reduced(self.frame.factor);
-        let outside = [f64::NEG_INFINITY; 2];
+        let (stood, outside) = (pose.stood(), [f64::NEG_INFINITY; 2]);
         let place =
-            |(&p, &wanted): (&Vec3, &bool)| wanted.then(|| camera.project(pose.apply(p))).flatten().unwrap_or(outside);
+            |(&p, &wanted): (&Vec3, &bool)| wanted.then(|| camera.project(stood.apply(p))).flatten().unwrap_or(outside);
         Placed(self.points.iter().zip(&self.wanted).map(place).collect())
     }
 

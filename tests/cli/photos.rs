@@ -125,3 +125,35 @@ fn a_photo_of_the_wrong_size_does_not_calibrate() {
     plate().run(&["calibrate", MODEL, "tiny.png", "-o", "t.calibration.ron"]).expect(2, &["8x8"]);
     assert!(!plate().0.join("t.calibration.ron").exists());
 }
+
+/// Verdicts are the same whoever listens; only `milliseconds` differ from run to run.
+#[test]
+fn timings_name_every_part_and_change_no_verdict() {
+    let photos = ["good.png", "missing.png", "rubbish.png"];
+    let plain = |text: &str| -> Vec<String> {
+        text.lines()
+            .filter(|l| l.starts_with("{\"photo\""))
+            .map(|l| l.split("\"milliseconds\"").next().unwrap().into())
+            .collect()
+    };
+    let quiet = inspect(&photos, &["--format", "json"]);
+    let table = inspect(&photos, &["--format", "json", "--timings"]);
+    assert_eq!(plain(&table.out), plain(&quiet.out));
+    assert!(table.err.contains("2 judged"), "what is no image is not judged: {}", table.err);
+    let objects = inspect(&photos, &["--format", "json", "--timings", "--message-format", "json"]);
+    assert_eq!(plain(&objects.out), plain(&quiet.out));
+    let timings: Vec<serde_json::Value> = objects.out.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    let timings: Vec<&serde_json::Value> = timings.iter().filter_map(|l| l.get("timings")).collect();
+    assert_eq!(timings.iter().map(|t| t["photo"].as_str().unwrap()).collect::<Vec<_>>(), ["good.png", "missing.png"]);
+    for photo in timings {
+        let parts = photo["parts"].as_array().unwrap();
+        let sum: f64 = parts.iter().map(|p| p["milliseconds"].as_f64().unwrap()).sum();
+        assert!((sum - photo["total"].as_f64().unwrap()).abs() < 1e-6);
+        for part in parts {
+            let name = part["part"].as_str().unwrap();
+            assert!(table.err.contains(&format!("\n{name} ")), "{name} is not in\n{}", table.err);
+            // A sound plate has nothing to explain, but every other part takes its time.
+            assert!(part["milliseconds"].as_f64().unwrap() > 0.0 || name == "explain", "{name}");
+        }
+    }
+}
