@@ -42,6 +42,16 @@ impl Integral {
         [((b + d - a - c) * share) as f32, ((c + d - a - b) * share) as f32]
     }
 
+    /// The same of the smallest cell, `half` = 1, straight from the image: most cells are of this size.
+    pub fn smallest(grid: &Grid, x: usize, y: usize) -> [f32; 2] {
+        let pair = |y: usize| -> [f32; 2] {
+            let row = &grid.values[y * grid.width + x - 1..][..2];
+            [row[0], row[1]]
+        };
+        let ([a, b], [c, d]) = (pair(y - 1), pair(y));
+        [((b + d) - (a + c)) * 0.25, ((c + d) - (a + b)) * 0.25]
+    }
+
     /// Sum over the pixels from a corner (inclusive) to another (exclusive).
     pub fn between(&self, [x0, y0]: [usize; 2], [x1, y1]: [usize; 2]) -> f64 {
         let at = |x: usize, y: usize| self.sums[y * self.width + x];
@@ -68,6 +78,7 @@ mod tests {
             assert!((h - 0.25 * half as f32 / 2.0).abs() < 1e-6, "{h}");
             assert!((v + 0.5 * half as f32 / 2.0).abs() < 1e-6, "{v}");
         }
+        assert_eq!(Integral::smallest(&grid, 8, 7), integral.gradient(8, 7, 1));
     }
 
     #[test]

@@ -152,7 +152,14 @@ impl Stencil {
     /// H and V of every cell.
     pub fn coefficients(&self, image: &Grid) -> Vec<f32> {
         let integral = Integral::new(image);
-        self.cells.iter().flat_map(|c| integral.gradient(c.x, c.y, c.half)).collect()
+        let mut out = Vec::with_capacity(self.len());
+        for c in &self.cells {
+            out.extend_from_slice(&match c.half {
+                1 => Integral::smallest(image, c.x, c.y),
+                half => integral.gradient(c.x, c.y, half),
+            });
+        }
+        out
     }
 
     /// The highest mean of a value per coefficient over the squares of the coarsest levels' cells (the coarsest first), each
