@@ -217,7 +217,8 @@ def classical_rows(scratch, sets):
                 scores = classical.scored(inspector, classical.grey(photo), goods, faulty, boxes)
                 for after in (False, True):
                     how = "best threshold after the fact" if after else "threshold from the correct photos"
-                    label = f"{inspector.name} ({inspector.teachers} photo{'s'[: inspector.teachers > 1]}, {how})"
+                    taught = min(inspector.teachers, len(goods) if inspector.teachers > 1 else 1)
+                    label = f"{inspector.name} ({taught} photo{'s'[: taught > 1]}, {how})"
                     for name, blamed in classical.verdicts(scores, list(goods), after).items():
                         counts[label].see(of.labels[name], "no-go" if blamed else "go", [blamed] if blamed else [])
         for label, count in counts.items():
