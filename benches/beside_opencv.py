@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Times gonogo by part beside OpenCV's rotated template search, on the same photos, in turn, on one core; with the verdicts of both.
+"""Times gonogo by part beside OpenCV's rotated template search: the same photos in turn, on one core, with both verdicts.
 
     python benches/beside_opencv.py GONOGO MODEL [CALIBRATION_PHOTO [FOLDER]]      needs `pip install opencv-python-headless`
 
@@ -20,6 +20,8 @@ os.environ.update(ONE)
 if hasattr(os, "sched_setaffinity"):
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
 
+sys.dont_write_bytecode = True
+
 import time
 
 import classical
@@ -32,7 +34,8 @@ class Gonogo:
     """One process that judges photo after photo."""
 
     def __init__(self, program, model, calibration):
-        arguments = ["inspect", model, "--calibration", calibration, "--format", "json", "--timings", "--message-format", "json", "-"]
+        arguments = ["inspect", model, "-", "--calibration", calibration, "--format", "json"]
+        arguments += ["--timings", "--message-format", "json"]
         self.process = subprocess.Popen([program, *map(str, arguments)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
     def judge(self, photo):
