@@ -55,24 +55,40 @@ fn interference(design: &Design, solids: &[Arc<Solid>], seen: &Seen) -> Vec<Diag
     once_per_placement(design, found)
 }
 
+/// What is told of the copies of one placement.
+struct Told {
+    /// Where the two are placed, and what is said of them.
+    about: (Span, Span, String),
+    diagnostic: Diagnostic,
+    others: Vec<String>,
+}
+
 /// Copies of one placement that enter the same component alike are told of once.
 fn once_per_placement(design: &Design, found: Vec<(usize, usize, Diagnostic)>) -> Vec<Diagnostic> {
-    let mut told: Vec<((Span, Span, String), Diagnostic, Vec<String>)> = Vec::new();
+    let mut all: Vec<Told> = Vec::new();
     for (a, b, diagnostic) in found {
         let [first, second] = [a, b].map(|c| &design.components[c]);
-        let key = (first.span, second.span, diagnostic.labels[0].text.replace(&first.name, ""));
-        match told.iter_mut().find(|(known, ..)| *known == key) {
-            Some((.., others)) => others.push(format!("`{}`", second.name)),
-            None => told.push((key, diagnostic, Vec::new())),
+        let about = (first.span, second.span, diagnostic.labels[0].text.replace(&first.name, ""));
+        match all.iter_mut().find(|told| told.about == about) {
+            Some(told) => told.others.push(format!("`{}`", second.name)),
+            None => all.push(Told { about, diagnostic, others: Vec::new() }),
         }
     }
-    let alike = |(_, diagnostic, others): (_, Diagnostic, Vec<String>)| match others.len() {
-        0 => diagnostic,
-        n if n > NAMED => diagnostic.note(format!("so do {} and {} others", others[..NAMED].join(", "), n - NAMED)),
-        1 => diagnostic.note(format!("so does {}", others[0])),
-        _ => diagnostic.note(format!("so do {}", others.join(", "))),
-    };
-    told.into_iter().map(alike).collect()
+    all.into_iter().map(Told::whole).collect()
+}
+
+impl Told {
+    fn whole(self) -> Diagnostic {
+        match self.others.as_slice() {
+            [] => self.diagnostic,
+            [one] => self.diagnostic.note(format!("so does {one}")),
+            others if others.len() > NAMED => {
+                let named = others[..NAMED].join(", ");
+                self.diagnostic.note(format!("so do {named} and {} others", others.len() - NAMED))
+            }
+            others => self.diagnostic.note(format!("so do {}", others.join(", "))),
+        }
+    }
 }
 
 fn clash(design: &Design, solids: &[Arc<Solid>], clash: &Clash) -> Diagnostic {
