@@ -261,7 +261,19 @@ impl Material {
             Material::Grooved { n, k, across, .. } => (MaterialKind::Metal, n, k, 1.0, across),
         };
         let ([edge_break, mottle], mottle_size) = ([0.0; 2], [1.0; 3]);
-        Finish { kind, n, k, reflectance, roughness, edge_break, mottle, mottle_size, mottle_seed: 0, lay: None }
+        Finish {
+            kind,
+            n,
+            k,
+            tints: Vec::new(),
+            reflectance,
+            roughness,
+            edge_break,
+            mottle,
+            mottle_size,
+            mottle_seed: 0,
+            lay: None,
+        }
     }
 
     fn grooved(&self, grooves: Grooves) -> Finish {

@@ -271,7 +271,7 @@ mod tests {
         let beside = findings(&pinned(6.0, [0.0; 2], 0.05, -1.0));
         assert_eq!((beside[0].0, beside[0].1.as_str()), ("E0501", "`pin` enters `plate` by 0.050 mm at nominal"));
         let thick = findings(&pinned(8.0, [0.0; 2], 0.0, 4.5));
-        assert_eq!((thick[0].0, thick[0].1.as_str()), ("E0501", "`pin` enters `plate` by 0.500 mm at nominal"));
+        assert_eq!((thick[0].0, thick[0].1.as_str()), ("E0501", "`pin` enters `plate` by 2.000 mm at nominal"));
     }
 
     #[test]

@@ -107,7 +107,7 @@ mod tests {
         let blamed = vec![Blamed { reason: "pin missing".into(), photos: 5 }];
         let lines = table(&proof(0), &Proof { rates: proof(5), seen_from: vec![Some(1.26)], blamed });
         assert_eq!(lines[2], "       5 x pin missing");
-        assert!(lines[5].contains("pin not seated") && lines[4].ends_with("9 in 10 from 1.3 mm on"), "{lines:?}");
+        assert!(lines[5].contains("pin not seated") && lines[5].ends_with("9 in 10 from 1.3 mm on"), "{lines:?}");
         assert!(lines[1].contains("promised    0 of 1000") && lines[1].contains("measured    5 of 1000"), "{lines:?}");
         assert!(lines.last().is_some_and(|l| l.contains("not kept")));
     }

@@ -351,6 +351,7 @@ const PANEL: &[Argument] = &[
     arg("at", Point, "its centre, in the assembly's frame"),
     AIM,
     POWER,
+    COLOUR,
 ];
 
 /// What takes arguments under that name in that role.

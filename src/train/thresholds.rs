@@ -46,8 +46,8 @@ fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
 /// The log-likelihood ratio below which a node counts as faulty in one way. Where good and faulty renders lie apart but below
 /// zero, the middle between them decides. Else its sign does, less what the promised rate of false rejects takes: of good
 /// renders a share `p0` falls below zero, and from there on likelihood ratios fall off as their own size says (a ratio of Λ is
-/// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap, the spread of the goods decides: it may allow less than
-/// that, and more where the renders belie the ratios.
+/// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap, ratios are not what they say, and the spread of the goods may
+/// take more.
 /// Ratios are natural logarithms, a ratio of 1 being that of `independent` coefficients' worth.
 /// Never a quantile of the goods: their few lowest scores say nothing about a photo's.
 pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independent: f64) -> f64 {
@@ -69,8 +69,8 @@ pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independ
     distances.sort_by(f64::total_cmp);
     // The median distance of a normal variable from its mean is 0.6745 standard deviations.
     let deviation = at_share(&distances, 0.5) / 0.6745;
-    let by_spread = (middle - normal_quantile(1.0 - false_reject) * deviation).min(0.0);
-    if lowest < by_ratio { by_spread } else { by_spread.max(by_ratio) }
+    let by_spread = middle - normal_quantile(1.0 - false_reject) * deviation;
+    by_spread.min(by_ratio)
 }
 
 /// Share of a normal variable below zero, from its mean and its deviation downwards: Chernoff's bound, halved.
@@ -114,14 +114,10 @@ mod tests {
     }
 
     #[test]
-    fn where_they_overlap_the_spread_of_the_goods_decides() {
+    fn where_they_overlap_the_spread_of_the_goods_decides_if_it_takes_more() {
         let limit = |good: &[f64]| threshold(good, &[-0.2, -0.1, 0.0, 0.1], 1e-3, INDEPENDENT);
         let (by_spread, by_ratio) = (|deviation: f64| -3.0902 * deviation / 0.6745, -(0.5f64 / 1e-3).ln() / 100.0);
-        assert!(
-            (limit(&[-0.010, -0.005, 0.0, 0.005, 0.010]) - by_spread(0.005)).abs() < 1e-3,
-            "less than the ratio takes"
-        );
-        assert!((limit(&[-0.05, -0.05, 0.0, 0.05, 0.05]) - by_ratio).abs() < 1e-9, "no more than the ratio takes");
+        assert!((limit(&[-0.010, -0.005, 0.0, 0.005, 0.010]) - by_ratio).abs() < 1e-9, "what the ratio takes");
         assert!((limit(&[-0.1, -0.05, 0.0, 0.05, 0.1]) - by_spread(0.05)).abs() < 1e-3, "renders belie the ratio");
     }
 }
