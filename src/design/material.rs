@@ -9,6 +9,7 @@ use crate::units::{Quantity, Range};
 
 /// Complex refractive indices. Rounded from refractiveindex.info (CC0): steel from Karlsson (austenitic stainless), aluminium
 /// from Mathewson and in blue, where that ends, from Rakić; brass from Querry (Cu70Zn30), copper from Querry.
+#[expect(clippy::approx_constant, reason = "3.14 is what was measured of copper")]
 const METALS: [(&str, Metal); 4] = [
     ("steel", Metal { white: [2.4, 4.1], led: [[1.68, 3.12], [1.97, 3.56], [2.33, 4.07], [3.25, 4.91]] }),
     ("aluminium", Metal { white: [1.4, 7.4], led: [[0.63, 5.45], [0.90, 6.26], [1.44, 7.26], [2.60, 7.64]] }),
