@@ -1,6 +1,6 @@
 //! The arguments and fields of the language, each with a line of documentation: what hovers and completions say.
 //!
-//! Tests hold them against what the compiler says it takes. What is no argument stands in [`keywords`](super::keywords).
+//! Tests hold them against what the compiler says it takes. What is no argument stands in `keywords`.
 
 pub use super::keywords::{GENERAL, HOLES, KEYWORDS, Keyword, SHAFTS, UNITS};
 
