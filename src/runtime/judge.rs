@@ -53,7 +53,7 @@ impl NodeImages {
             wanted.iter_mut().zip(&surroundings).for_each(|(wanted, outside)| *wanted |= outside);
         }
         Some(NodeImages {
-            window: Window::new(Frame::of(node), nominal, home)?.only(wanted),
+            window: Window::new(Frame::of(node), nominal, home)?.masked(wanted),
             stencil,
             surroundings,
             spread: node.spread.map(|s| s / f64::from(node.factor)),

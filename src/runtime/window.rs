@@ -56,7 +56,7 @@ impl Window {
     }
 
     /// The same window in which only these pixels are looked at: the others are cut as 0.
-    pub fn only(self, wanted: Vec<bool>) -> Window {
+    pub fn masked(self, wanted: Vec<bool>) -> Window {
         Window { wanted, ..self }
     }
 
