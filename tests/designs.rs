@@ -19,7 +19,7 @@ const MESHES: [(&str, usize, f64, f64); 4] = [
     ("example014", 1, 5_936.760, 40_000.0),
 ];
 
-/// Design, parts: its mesh was too much for OpenSCAD, and all of its parts are solids here.
+/// Design, parts, without a volume by OpenSCAD: all of its parts must become solids, whatever their volume.
 const SOLIDS: [(&str, usize); 5] =
     [("logo", 1), ("example001", 1), ("example005", 1), ("example022", 2), ("functions", 82)];
 
