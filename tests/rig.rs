@@ -223,7 +223,7 @@ fn what_does_not_fit_together_is_refused() {
     let refused = |text: &str| Rig::read(text).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(refused(&text.replacen("two_views", "two_lies!", 1)).starts_with("E0802: "));
     assert!(refused(&text[..text.len() / 2]).starts_with("E0802: "));
-    assert!(refused(&text.replacen("format: 4", "format: 5", 1)).starts_with("E0801: "));
+    assert!(refused(&text.replacen("format: 5", "format: 6", 1)).starts_with("E0801: "));
 }
 
 #[test]

@@ -116,14 +116,19 @@ impl Contact {
 
     /// Normals out of `a` over the arc of a cylinder or cone.
     fn normals(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        let (u, v) = square_to(self.direction);
         let full = if self.full { 1.0 } else { -1.0 };
         let (sin, cos) = self.slope.sin_cos();
-        (0..BINS).filter(|k| self.arc >> k & 1 == 1).map(move |k| {
-            let angle = (k as f64 + 0.5) * TAU / BINS as f64;
-            ((u * angle.cos() + v * angle.sin()) * cos - self.direction.into_inner() * sin) * full
-        })
+        rays(self.direction, self.arc).map(move |ray| (ray * cos - self.direction.into_inner() * sin) * full)
     }
+}
+
+/// Directions out of an axis over an arc.
+fn rays(axis: Unit<Vector3<f64>>, arc: u32) -> impl Iterator<Item = Vector3<f64>> {
+    let (u, v) = square_to(axis);
+    (0..BINS).filter(move |k| arc >> k & 1 == 1).map(move |k| {
+        let angle = (k as f64 + 0.5) * TAU / BINS as f64;
+        u * angle.cos() + v * angle.sin()
+    })
 }
 
 /// A direction lies along another, or in a plane, when the sine of their angle is below this.
@@ -270,7 +275,14 @@ impl<'a> Survey<'a> {
         if near {
             self.contact(pair, bodies, &candidate, &common, joint);
         } else {
-            self.found.clashes.push(Clash { a, b, depth: candidate.miss() });
+            let gap = candidate.gap.abs() / 2.0;
+            let ways = common.ways(&candidate, f.outward);
+            let towards = ways.iter().map(|way| way.dot(&candidate.offset) - gap).reduce(f64::max);
+            let depth = towards.unwrap_or(candidate.miss());
+            // Where a part of a cylinder stands off from a part of its hole there is air.
+            if depth > TOUCH {
+                self.found.clashes.push(Clash { a, b, depth });
+            }
         }
     }
 
@@ -322,7 +334,8 @@ impl<'a> Survey<'a> {
             full: c.kind == ContactKind::Plane || f.outward,
         };
         let sign = if contact.full { 1.0 } else { -1.0 };
-        let gauge = Gauge { kind: c.kind, direction: c.direction, probes: common.probes(&contact), sign };
+        let (probes, ways) = (common.probes(&contact), common.ways(c, contact.full));
+        let gauge = Gauge { kind: c.kind, direction: c.direction, probes, sign, ways };
         let tight = self.measure(&mut contact, [(a, bodies[0]), (b, bodies[1])], &gauge, joint, [f, g]);
         self.found.tight.extend(tight);
         self.found.contacts.push(contact);
@@ -420,6 +433,15 @@ impl Common {
         let span = [p[0].max(q[0]), p[1].min(q[1])];
         let area = TAU * radius(&f.surface) * (span[1] - span[0]);
         (area >= LEAST_AREA).then_some(Common { area, span, arc: u32::MAX, outline: Vec::new() })
+    }
+
+    /// Of cylinders that share a part of the turn: the directions in which an offset of the second axis brings the faces nearer.
+    /// `full` says that the first face is the full one.
+    fn ways(&self, c: &Candidate, full: bool) -> Vec<Vector3<f64>> {
+        if c.kind != ContactKind::Cylinder || self.arc == u32::MAX {
+            return Vec::new();
+        }
+        rays(c.direction, self.arc).map(|ray| if full { -ray } else { ray }).collect()
     }
 
     /// Where a contact is gauged.

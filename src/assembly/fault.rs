@@ -8,7 +8,7 @@
 use super::flip::Flip;
 use super::insertion::Insertion;
 use super::liaison::Liaison;
-use super::loose::loose;
+use super::loose::{askew, loose};
 use super::piece;
 use super::place::place;
 use super::room::Among;
@@ -48,7 +48,7 @@ pub enum Motion {
     Remove,
     /// As [`Motion::Remove`], from under others, which may come down.
     RemoveUnder(Sink),
-    /// Short of its seat along its removal direction (unit vector) by `from`..`to` mm.
+    /// Short of its seat along its removal direction (unit vector) by `from`..`to` mm ([`swept`]).
     Slide {
         direction: [f64; 3],
         from: f64,
@@ -112,7 +112,7 @@ pub struct Faulted {
 }
 
 /// The smallest error in position that matters (mm).
-const SMALLEST: f64 = 0.8;
+const SMALLEST: f64 = 0.5;
 /// The largest that is looked for (mm): what stands higher is as easy to see.
 const LARGEST: f64 = 4.0;
 /// A part that fits hold over no more than this (mm) in all may come out of them at one side.
@@ -136,7 +136,12 @@ pub fn modes(design: &Design, liaison: &Liaison, insertion: &Insertion, solids: 
         let turns = turns.into_iter().map(|t| (FaultKind::Misplaced, Motion::Turn(t)));
         let remove = sink(component, insertion, liaison, solids, &poses).map_or(Motion::Remove, Motion::RemoveUnder);
         let among = Among { component, insertion, solids, poses: &poses };
-        let loose = if is_loose(liaison, insertion, component) { loose(design, &among, SMALLEST) } else { Vec::new() };
+        let loose = match held(liaison, insertion, component) {
+            Some(length) if length < BARELY => loose(design, &among, SMALLEST),
+            // What lies on it holds it down.
+            Some(length) if insertion.above[component].is_empty() => askew(&among, SMALLEST, length),
+            _ => Vec::new(),
+        };
         let motions = [(FaultKind::Missing, remove)].into_iter().chain(slide).chain(turns).chain(loose);
         motions.map(move |(kind, motion)| ErrorMode { component, kind, motion }).collect::<Vec<_>>()
     };
@@ -173,7 +178,7 @@ pub fn apply(mode: &ErrorMode, u: [f64; 3], solids: &[Arc<Solid>], poses: &[Isom
             Faulted { pose: None, pushed, ..still(pose, "missing") }
         }
         Motion::Slide { direction, from, to } => {
-            let size = from + (to - from) * u[0];
+            let size = swept(*from, *to, u[0]);
             let moved = Translation3::from(Vector3::from(*direction) * size) * pose;
             let word = if direction[2] > 0.7 { "raised" } else { "short of its seat by" };
             Faulted { size, ..still(moved, &format!("{word} {size:.1} mm")) }
@@ -198,6 +203,12 @@ pub fn apply(mode: &ErrorMode, u: [f64; 3], solids: &[Arc<Solid>], poses: &[Isom
             Faulted { solid: Some(solids[*by].clone()), ..still(pose, &format!("in its place the part of {name}")) }
         }
     }
+}
+
+/// The size at a place (0..1) in the sweep of a slide (mm). It grows with the square of the place: a small fault is the harder
+/// to see, and a little more of it changes it more.
+pub fn swept(from: f64, to: f64, place: f64) -> f64 {
+    from + (to - from) * place * place
 }
 
 fn still(pose: Isometry3<f64>, text: &str) -> Faulted {
@@ -236,11 +247,10 @@ fn engaged_length(liaison: &Liaison, component: usize, direction: Unit<Vector3<f
     (!spans.is_empty()).then_some(total)
 }
 
-/// Whether a component rests on others and no fit holds it sideways.
-fn is_loose(liaison: &Liaison, insertion: &Insertion, component: usize) -> bool {
+/// Over what length fits hold a component sideways (mm) that rests on others; `None` if it does not.
+fn held(liaison: &Liaison, insertion: &Insertion, component: usize) -> Option<f64> {
     let direction = insertion.direction(component);
-    let held = engaged_length(liaison, component, direction).unwrap_or(0.0);
-    held < BARELY && liaison.rests(component, direction)
+    liaison.rests(component, direction).then(|| engaged_length(liaison, component, direction).unwrap_or(0.0))
 }
 
 /// Components whose part could stand in this one's place: another part, held by the same neighbours in the same way, and

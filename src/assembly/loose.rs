@@ -1,7 +1,8 @@
-//! The faults of a part that rests on others and that no fit holds: up at one side, beside its place, upside down.
+//! The faults of a part that rests on others and that no fit holds: up at one side, beside its place, upside down; and of one
+//! that fits guide over a short length: up at one side.
 //!
 //! In: such a component among the others, and the zone in which it may lie. Out: its error modes, at most one of each sort.
-//! Whether it is held by a fit is not asked here.
+//! Which of the two it is is not asked here.
 
 use super::fault::{FaultKind, Motion};
 use super::room::{Among, Room};
@@ -15,11 +16,18 @@ pub(crate) fn loose(design: &Design, of: &Among, least: f64) -> Vec<(FaultKind, 
     if !room.seated {
         return Vec::new();
     }
-    let tilt = tilt::tilt(&room, least).map(|t| (FaultKind::NotSeated, Motion::Tilt(t)));
+    let tilt = tilt::tilt(&room, least, None).map(|t| (FaultKind::NotSeated, Motion::Tilt(t)));
     let shift = place_zone(design, of).and_then(|zone| shift::shift(&room, &zone, least));
     let shift = shift.map(|s| (FaultKind::Misplaced, Motion::Shift(s)));
     let flip = flip::flip(&room).map(|f| (FaultKind::Misplaced, Motion::Flip(f)));
     tilt.into_iter().chain(shift).chain(flip).collect()
+}
+
+/// The mode by which a component that fits guide over `length` mm is up at one side by `least` mm or more.
+pub(crate) fn askew(of: &Among, least: f64, length: f64) -> Vec<(FaultKind, Motion)> {
+    let room = Room::new(of, 0.0);
+    let tilt = room.seated.then(|| tilt::tilt(&room, least, Some(length))).flatten();
+    tilt.map(|t| (FaultKind::NotSeated, Motion::Tilt(t))).into_iter().collect()
 }
 
 /// Half the tolerance of a component's place along a direction (mm); `None` if some place is free.
@@ -160,7 +168,7 @@ mod tests {
         let loose = washer(10.0);
         let shift = shift_of(&loose).expect("2 mm of play");
         assert_eq!(shift.ways.len(), 8);
-        assert!(shift.ways.iter().all(|w| w.from == 0.8 && (1.8..2.4).contains(&w.to)), "{shift:?}");
+        assert!(shift.ways.iter().all(|w| w.from == 0.5 && (1.8..2.4).contains(&w.to)), "{shift:?}");
     }
 
     /// A bolt in its hole, and a disc with a spigot in a bore: nothing moves sideways, leans or is turned over.
@@ -177,6 +185,28 @@ mod tests {
             0,
             "{found:?}"
         );
+    }
+
+    /// A disc on a stud of a base, guided over 3 mm: 40 mm across it jams askew, 8 mm across it does not.
+    #[test]
+    fn a_wide_part_guided_over_a_short_length_can_be_up_at_one_side() {
+        let cylinder = |d: f64, h: f64| Shape::Cylinder { d: Expr::Const(d), h: Extent::Length(Expr::Const(h)) };
+        let tilts = |across: f64, high: f64| {
+            let mut shop = Shop::default();
+            let base = vec![
+                ("slab", Op::Add, cuboid(80.0, 80.0, 5.0), [0.0; 3]),
+                ("stud", Op::Add, cylinder(4.0, 3.0), [0.0, 0.0, 5.0]),
+            ];
+            let disc = vec![
+                ("body", Op::Add, cylinder(across, high), [0.0; 3]),
+                ("hole", Op::Cut, cylinder(4.05, high + 2.0), [0.0, 0.0, -1.0]),
+            ];
+            let (base, disc) = (shop.made_of("base", base), shop.made_of("disc", disc));
+            shop.place("base", base, [0.0; 3], 0.0, 0.0);
+            let component = shop.place("disc", disc, [0.0, 0.0, 5.0], 0.0, 0.0);
+            count(&modes_of(&mut shop.finish(), component), |m| matches!(m, Motion::Tilt(_)))
+        };
+        assert_eq!((tilts(40.0, 4.0), tilts(8.0, 4.0)), (1, 0));
     }
 
     /// A low lid on a plate; with a bar above it that leaves it 0.3 mm, or without.

@@ -99,12 +99,24 @@ pub(crate) struct Lie {
     pub gap: f64,
     /// By how much the axes or centres miss each other, as it counts square to the surfaces (mm).
     pub offset: Vector3<f64>,
+    /// The direction of the offset in which the surfaces come nearer; `None` where they surround each other, so that any does.
+    pub way: Option<Vector3<f64>>,
 }
 
 impl Lie {
     /// The distance of the surfaces where they come nearest (mm); negative where they enter each other.
     pub fn margin(&self) -> f64 {
-        self.gap - self.offset.norm()
+        self.gap - self.way.map_or_else(|| self.offset.norm(), |way| way.dot(&self.offset))
+    }
+
+    /// What of another is to be added to this one.
+    pub fn plus(&self, other: &Lie) -> Lie {
+        Lie { gap: self.gap + other.gap, offset: self.offset + other.offset, way: self.way }
+    }
+
+    /// What this one has more than another.
+    pub fn minus(&self, other: &Lie) -> Lie {
+        Lie { gap: self.gap - other.gap, offset: self.offset - other.offset, way: self.way }
     }
 }
 
@@ -117,12 +129,18 @@ pub(crate) struct Gauge {
     pub probes: Vec<Point3<f64>>,
     /// +1 when the first face is the full one (or out of whose plane `direction` points), -1 when the second is.
     pub sign: f64,
+    /// Of cylinders that surround each other in part only: the directions of the offset in which they come nearer.
+    pub ways: Vec<Vector3<f64>>,
 }
 
 impl Gauge {
-    /// One lie per probe; nothing where the surfaces are no longer of the contact's kind.
+    /// Lies at all probes, in all ways; nothing where the surfaces are no longer of the contact's kind.
     pub fn lies(&self, s: &Surface, t: &Surface) -> Vec<Lie> {
-        self.probes.iter().filter_map(|p| self.lie(p, s, t)).collect()
+        let lies = self.probes.iter().filter_map(|p| self.lie(p, s, t));
+        if self.ways.is_empty() {
+            return lies.collect();
+        }
+        lies.flat_map(|lie| self.ways.iter().map(move |&way| Lie { way: Some(way), ..lie })).collect()
     }
 
     fn lie(&self, p: &Point3<f64>, s: &Surface, t: &Surface) -> Option<Lie> {
@@ -130,23 +148,23 @@ impl Gauge {
         match (s, t) {
             (Surface::Plane { normal: n, offset: f }, Surface::Plane { normal: m, offset: g }) => {
                 let along = |n: &Vector3<f64>, offset: f64| (offset - n.dot(&p.coords)) / n.dot(&d);
-                Some(Lie { gap: along(m, *g) - along(n, *f), offset: Vector3::zeros() })
+                Some(Lie { gap: along(m, *g) - along(n, *f), offset: Vector3::zeros(), way: None })
             }
             (Surface::Cylinder { point, axis, radius }, Surface::Cylinder { point: q, axis: m, radius: r }) => {
                 let offset = pierce(q, m, p, &d) - pierce(point, axis, p, &d);
-                Some(Lie { gap: self.sign * (r - radius), offset })
+                Some(Lie { gap: self.sign * (r - radius), offset, way: None })
             }
             (Surface::Cone { apex, axis, half_angle }, Surface::Cone { apex: q, axis: m, half_angle: t }) => {
                 let wide = |apex: &Point3<f64>, axis: &Vector3<f64>, angle: f64| (p - apex).dot(axis) * angle.tan();
                 let gap = self.sign * (wide(q, m, *t) - wide(apex, axis, *half_angle)) * half_angle.cos();
                 let offset = (pierce(q, m, p, &d) - pierce(apex, axis, p, &d)) * half_angle.cos();
-                Some(Lie { gap, offset })
+                Some(Lie { gap, offset, way: None })
             }
             (Surface::Sphere { centre, radius, .. }, Surface::Sphere { centre: q, radius: r, .. }) => {
-                Some(Lie { gap: self.sign * (r - radius), offset: q - centre })
+                Some(Lie { gap: self.sign * (r - radius), offset: q - centre, way: None })
             }
             (Surface::Torus { centre, major, minor, .. }, Surface::Torus { centre: q, major: wide, minor: r, .. }) => {
-                Some(Lie { gap: self.sign * (r - minor) - (wide - major).abs(), offset: q - centre })
+                Some(Lie { gap: self.sign * (r - minor) - (wide - major).abs(), offset: q - centre, way: None })
             }
             _ => None,
         }
@@ -172,7 +190,7 @@ mod tests {
     use super::*;
 
     fn gauge(kind: ContactKind, probes: Vec<Point3<f64>>) -> Gauge {
-        Gauge { kind, direction: Vector3::z_axis(), probes, sign: 1.0 }
+        Gauge { kind, direction: Vector3::z_axis(), probes, sign: 1.0, ways: Vec::new() }
     }
 
     fn cone(z: f64, x: f64, half_angle: f64) -> Surface {
@@ -213,6 +231,23 @@ mod tests {
         let gauge = gauge(ContactKind::Torus, vec![Point3::origin()]);
         let lies = gauge.lies(&torus(0.0, 10.0, 2.0), &torus(0.03, 10.05, 2.2));
         assert!((lies[0].gap - 0.15).abs() < 1e-12 && (lies[0].margin() - 0.12).abs() < 1e-12, "{lies:?}");
+    }
+
+    /// Half a pin in half a hole: where the hole's wall is missing nothing meets.
+    #[test]
+    fn parts_of_cylinders_meet_in_their_own_directions_only() {
+        let cylinder = |x: f64, radius: f64| Surface::Cylinder {
+            point: Point3::new(x, 0.0, 0.0),
+            axis: Vector3::z_axis(),
+            radius,
+        };
+        let ways = vec![Vector3::x(), (Vector3::x() + Vector3::y()).normalize()];
+        let gauge = Gauge { ways, ..gauge(ContactKind::Cylinder, vec![Point3::origin()]) };
+        let nearest = |x: f64| {
+            let lies = gauge.lies(&cylinder(0.0, 3.0), &cylinder(x, 3.02));
+            lies.iter().map(Lie::margin).fold(f64::INFINITY, f64::min)
+        };
+        assert!((nearest(0.5) - (0.02 - 0.5)).abs() < 1e-12 && nearest(-0.5) > 0.37);
     }
 
     #[test]

@@ -84,9 +84,7 @@ impl Mating<'_> {
                 if lies.len() != still.len() {
                     return None;
                 }
-                lies.iter_mut()
-                    .zip(still)
-                    .for_each(|(l, s)| *l = Lie { gap: l.gap - s.gap, offset: l.offset - s.offset });
+                lies.iter_mut().zip(still).for_each(|(l, s)| *l = l.minus(s));
             }
             if ends.iter().flatten().any(|l| l.gap.abs() + l.offset.norm() > NOTHING) {
                 moves.push(Move { dim, values: [range.low, range.high], ends });
@@ -129,6 +127,9 @@ const ROUNDS: usize = 8;
 /// For a direction of the offset the worst limit of every dimension is known, and these limits give the offset a new
 /// direction: repeated from every direction that one dimension alone moves it, and two together do.
 fn worst(still: Lie, moves: &[[Lie; 2]]) -> Corner {
+    if let Some(way) = still.way {
+        return towards(still, moves, way);
+    }
     let offsets: Vec<Vector3<f64>> =
         moves.iter().flatten().map(|l| l.offset).filter(|o| o.norm() > NOTHING).take(MOST_STARTS).collect();
     let two = offsets.iter().enumerate().flat_map(|(i, p)| offsets[..i].iter().map(move |q| p + q));
@@ -159,10 +160,10 @@ fn towards(still: Lie, moves: &[[Lie; 2]], way: Vector3<f64>) -> Corner {
     let mut lie = still;
     for (m, end) in moves.iter().zip(&ends) {
         if let Some(end) = end {
-            lie = Lie { gap: lie.gap + m[*end].gap, offset: lie.offset + m[*end].offset };
+            lie = lie.plus(&m[*end]);
         }
     }
-    let towards = lie.offset.try_normalize(NOTHING).unwrap_or(way);
+    let towards = lie.way.or_else(|| lie.offset.try_normalize(NOTHING)).unwrap_or(way);
     Corner { margin: lie.margin(), ends, towards, probe: moves.to_vec() }
 }
 

@@ -144,7 +144,7 @@ impl Case<'_> {
         }
     }
 
-    /// What clearance there is and what placement takes of it.
+    /// What clearance there is, and what placement takes of it.
     fn room(&self) -> String {
         let left = self.contact.gap_range[0];
         let reach: f64 = self.shares.iter().filter(|s| s.sideways).map(|s| s.loss).sum();
@@ -153,7 +153,9 @@ impl Case<'_> {
         } else if left < 0.0 {
             format!("at MMC they interfere by {:.4} mm, and placement allows ±{reach:.4} mm", -left)
         } else {
-            format!("at MMC {left:.4} mm of clearance is left, but placement allows ±{reach:.4} mm")
+            // Of faces with diameters the gap is their difference.
+            let left = if self.contact.fit.is_some() { left / 2.0 } else { left };
+            format!("at MMC {left:.4} mm of clearance is left to every side, but placement allows ±{reach:.4} mm")
         }
     }
 

@@ -2,7 +2,8 @@
 //!
 //! In: the room that the others leave a component. Out: the sides that can be up while the opposite rim stays on the seat: a
 //! ring out of its groove at one side, a cover on a chip. Only for parts that rest on a seat wide compared with their height:
-//! others fall over, or lie in a way of their own.
+//! others fall over, or lie in a way of their own. A part that pins or a bore guide over a length short compared with its width
+//! jams askew, as a drawer does; what holds it or lies on it is then no bar.
 
 use super::room::Room;
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -40,23 +41,32 @@ const STEPS: usize = 4;
 /// A seat has at least this many cells.
 const SEAT: usize = 9;
 
-/// The sides of a component that can be up by `least` mm or more.
-pub(crate) fn tilt(room: &Room, least: f64) -> Option<Tilt> {
+/// What guides a part over less than this share of its seat's width does not keep it level.
+const SHORT: f64 = 0.5;
+
+/// The sides of a component that can be up by `least` mm or more. `guided` is over what length fits guide it (mm); `None` for a
+/// part that lies loose.
+pub(crate) fn tilt(room: &Room, least: f64, guided: Option<f64>) -> Option<Tilt> {
     let seat: Vec<Point3<f64>> = room.seat();
     if seat.len() < SEAT {
         return None;
     }
-    let sides: Vec<Side> = room.around(SIDES).into_iter().filter_map(|up| side(room, &seat, up, least)).collect();
+    let sides: Vec<Side> =
+        room.around(SIDES).into_iter().filter_map(|up| side(room, &seat, up, least, guided)).collect();
     (!sides.is_empty()).then_some(Tilt { sides })
 }
 
-fn side(room: &Room, seat: &[Point3<f64>], up: Unit<Vector3<f64>>, least: f64) -> Option<Side> {
+fn side(room: &Room, seat: &[Point3<f64>], up: Unit<Vector3<f64>>, least: f64, guided: Option<f64>) -> Option<Side> {
     let along = |p: &Point3<f64>| p.coords.dot(&up);
     let low = seat.iter().min_by(|a, b| along(a).total_cmp(&along(b)))?;
     let high = seat.iter().map(along).fold(f64::NEG_INFINITY, f64::max);
     let centre = room.centre();
     let width = along(&centre) + room.reach_along(&up, &room.home()) - along(low);
-    if high - along(low) < WIDE * room.height || along(low) > along(&centre) {
+    let seat_width = high - along(low);
+    if seat_width < WIDE * room.height || along(low) > along(&centre) {
+        return None;
+    }
+    if guided.is_some_and(|length| length > SHORT * seat_width) {
         return None;
     }
     // The middle of the rim: nearest to the middle of the part.
@@ -68,7 +78,7 @@ fn side(room: &Room, seat: &[Point3<f64>], up: Unit<Vector3<f64>>, least: f64) -
         return None;
     }
     let heights = (0..=STEPS).map(|k| all.from + (all.to - all.from) * k as f64 / STEPS as f64);
-    let to = heights.take_while(|h| room.clears(&all.up(*h, &room.home()))).last()?;
+    let to = heights.take_while(|h| guided.is_some() || room.clears(&all.up(*h, &room.home()))).last()?;
     room.shows(&all.up(to, &room.home())).then_some(Side { to, ..all })
 }
 

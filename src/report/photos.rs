@@ -179,7 +179,7 @@ fn crops(shot: &Shot, trained: &Trained, node: &Node, report: &NodeReport) -> Op
     let camera = trained.calibration.map_or(station.camera, |c| c.installation.apply(&station.camera));
     let window = Window::new(Frame::of(node), &station.camera, &Pose::home(station))?;
     let reduced = photo.light.reduced(node.factor as usize);
-    let (seen, _) = window.cut(&reduced, &window.place(&camera, &pose), [0.0; 2]);
+    let seen = window.cut(&reduced, &window.place(&camera, &pose), [0.0; 2]);
     let weights = templates::weights(trained);
     let expected = |h: usize| picture::light(&templates::expected(node, h, &weights), station.tone);
     // Of several sizes of one fault, that which the photo speaks for most.

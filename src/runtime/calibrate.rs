@@ -25,7 +25,7 @@ const ROUNDING: f64 = 1.0 / (255.0 * 3.464);
 /// The fault that comes in any size.
 pub(super) const SLIGHT: &str = "not seated";
 /// Format of the calibration file.
-pub const FORMAT: u32 = 4;
+pub const FORMAT: u32 = 5;
 
 /// What one photo tells about a station.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -8,7 +8,9 @@
 
 use super::linear;
 use super::math::{ln, ln_product};
+use super::sight::Glance;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Learned directions per hypothesis.
 const DIRECTIONS: usize = 3;
@@ -18,8 +20,6 @@ const SHRINK_DRAWS: f64 = 6.0;
 const MODEL_ERROR: f64 = 0.12;
 /// Degrees of freedom of the noise.
 const STUDENT: f64 = 5.0;
-/// A search over shifts looks at about so many coefficients.
-const SEARCHED: usize = 1000;
 
 pub struct Density {
     mean: Vec<f32>,
@@ -31,8 +31,8 @@ pub struct Density {
     factor: Vec<f64>,
     /// -(log det(I + WᵀΛW) - Σ log precision) / 2.
     log_norm: f64,
-    /// The same of one cell in so many, where there are more than a search needs.
-    sparse: Option<(usize, Box<Density>)>,
+    /// The same of the cells that a search asks, where these are not all.
+    some: Option<(Arc<[usize]>, Box<Density>)>,
 }
 
 /// What the densities of one node share.
@@ -42,13 +42,15 @@ pub struct Floor {
     pub noise: f64,
     /// Root mean square of the good template per level.
     pub rms: Vec<f64>,
+    /// The cells that a search asks; `None` where it asks all.
+    pub searched: Option<Arc<[usize]>>,
 }
 
 impl Floor {
-    pub fn new(levels: &[Range<usize>], noise: f64, good_mean: &[f32]) -> Floor {
+    pub fn new(levels: &[Range<usize>], noise: f64, good_mean: &[f32], searched: Option<Arc<[usize]>>) -> Floor {
         let square = |r: &Range<usize>| good_mean[r.clone()].iter().map(|&v| f64::from(v).powi(2)).sum::<f64>();
         let rms = levels.iter().map(|r| (square(r) / r.len().max(1) as f64).sqrt()).collect();
-        Floor { levels: levels.to_vec(), noise, rms }
+        Floor { levels: levels.to_vec(), noise, rms, searched }
     }
 }
 
@@ -72,16 +74,22 @@ impl Density {
         let freedom = samples.len().saturating_sub(1 + columns.len()).max(1);
         let variance = variance(&rests, freedom, floor);
         let precision: Vec<f32> = variance.iter().map(|&v| 1.0 / v).collect();
-        Density::assemble(mean, columns.into_iter().chain(lamps).collect(), precision)
+        let columns = columns.into_iter().chain(lamps).collect();
+        Density::assemble(mean, columns, precision, floor.searched.clone())
     }
 
-    fn assemble(mean: Vec<f32>, columns: Vec<Vec<f32>>, precision: Vec<f32>) -> Density {
-        let step = mean.len() / SEARCHED;
-        let sparse = (step > 1).then(|| {
-            let columns = columns.iter().map(|c| thinned(c, step)).collect();
-            (step, Box::new(Density::whole(thinned(&mean, step), columns, thinned(&precision, step))))
+    fn assemble(
+        mean: Vec<f32>,
+        columns: Vec<Vec<f32>>,
+        precision: Vec<f32>,
+        searched: Option<Arc<[usize]>>,
+    ) -> Density {
+        let some = searched.map(|cells| {
+            let of = |all: &Vec<f32>| Glance::of(&cells, all);
+            let some = Density::whole(of(&mean), columns.iter().map(of).collect(), of(&precision));
+            (cells, Box::new(some))
         });
-        Density { sparse, ..Density::whole(mean, columns, precision) }
+        Density { some, ..Density::whole(mean, columns, precision) }
     }
 
     fn whole(mean: Vec<f32>, columns: Vec<Vec<f32>>, precision: Vec<f32>) -> Density {
@@ -99,7 +107,7 @@ impl Density {
         let factor = linear::cholesky(&gram, n).unwrap_or_else(|| identity(n));
         let log_det: f64 = (0..n).map(|i| ln(factor[i * n + i]) * 2.0).sum();
         let log_precision: f64 = ln_product(precision.iter().map(|&p| f64::from(p)));
-        Density { mean, columns, precision, factor, log_norm: (log_precision - log_det) / 2.0, sparse: None }
+        Density { mean, columns, precision, factor, log_norm: (log_precision - log_det) / 2.0, some: None }
     }
 
     /// What a real sample has and neither mean nor nuisances know.
@@ -132,15 +140,24 @@ impl Density {
         let column = |gap: &Vec<f32>| gap.iter().zip(share).map(|(g, s)| g * s * part.sqrt()).collect();
         let columns = std::mem::take(&mut self.columns).into_iter().chain(gaps.iter().map(column)).collect();
         let (mean, precision) = (std::mem::take(&mut self.mean), std::mem::take(&mut self.precision));
-        *self = Density::assemble(mean, columns, precision);
+        let searched = self.some.take().map(|(cells, _)| cells);
+        *self = Density::assemble(mean, columns, precision, searched);
     }
 
-    /// Log density under Gaussian noise, up to a constant: fast, for the search over shifts. Of a large node it is that of some of
-    /// its cells, times their share.
+    /// Log density under Gaussian noise, up to a constant: fast, for the search over shifts. `z` is what the search asks: of a large
+    /// node some of its cells, whose log density counts for all of them.
     pub fn searched(&self, z: &[f32]) -> f64 {
-        match &self.sparse {
-            Some((step, some)) => some.gaussian(&thinned(z, *step)) * z.len() as f64 / some.mean.len() as f64,
+        match &self.some {
+            Some((_, some)) => some.gaussian(z) * self.mean.len() as f64 / some.mean.len() as f64,
             None => self.gaussian(z),
+        }
+    }
+
+    /// The same under Student's noise.
+    pub fn searched_student(&self, z: &[f32]) -> f64 {
+        match &self.some {
+            Some((_, some)) => some.student(z) * self.mean.len() as f64 / some.mean.len() as f64,
+            None => self.student(z),
         }
     }
 
@@ -205,11 +222,6 @@ impl Density {
         let scaled = weighted(&rest, &self.precision);
         (dot(&rest, &scaled), self.columns.iter().map(|c| dot(c, &scaled)).collect())
     }
-}
-
-/// The two coefficients of one cell in `step`.
-fn thinned(values: &[f32], step: usize) -> Vec<f32> {
-    values.chunks(2).step_by(step).flatten().copied().collect()
 }
 
 fn identity(n: usize) -> Vec<f64> {
@@ -325,7 +337,7 @@ mod tests {
     }
 
     fn one_level(n: usize) -> Floor {
-        Floor { levels: std::iter::once(0..n).collect(), noise: 0.01, rms: vec![0.1] }
+        Floor { levels: std::iter::once(0..n).collect(), noise: 0.01, rms: vec![0.1], searched: None }
     }
 
     #[test]
@@ -343,14 +355,15 @@ mod tests {
     /// A search over shifts asks which of two is likelier, not how likely they are.
     #[test]
     fn some_cells_of_a_large_node_tell_which_shift_is_likelier() {
-        let n = 6 * SEARCHED + 2;
+        let n = 6002;
         let samples: Vec<Vec<f32>> = (0..9).map(|i| noise(n, i)).collect();
-        let density = Density::fit(&samples, Vec::new(), &one_level(n));
-        assert!(density.sparse.is_some());
+        let cells: Arc<[usize]> = (0..n / 2).step_by(6).collect();
+        let floor = Floor { searched: Some(cells.clone()), ..one_level(n) };
+        let density = Density::fit(&samples, Vec::new(), &floor);
         let off = |by: f32| -> Vec<f32> { noise(n, 40).iter().zip(&density.mean).map(|(r, m)| r * by + m).collect() };
         let (near, far) = (off(1.0), off(2.0));
-        let (some, all) =
-            (density.searched(&near) - density.searched(&far), density.gaussian(&near) - density.gaussian(&far));
+        let searched = |z: &[f32]| density.searched(&Glance::of(&cells, z));
+        let (some, all) = (searched(&near) - searched(&far), density.gaussian(&near) - density.gaussian(&far));
         assert!((some / all - 1.0).abs() < 0.1, "{some} {all}");
     }
 

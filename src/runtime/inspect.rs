@@ -7,7 +7,7 @@
 use super::calibrate::{Calibration, widened};
 use super::camera::Camera;
 use super::density::Density;
-use super::judge::{Evidence, NodeImages, Prepared};
+use super::judge::{Evidence, NodeImages, Prepared, Pyramid};
 use super::light::Light;
 use super::locate::{Located, Search};
 use super::look::Look;
@@ -68,7 +68,7 @@ pub struct NodeReport {
     /// The error mode that fits best.
     pub best_fault: String,
     pub inside: f64,
-    /// How unlike its good state the node is where it is least like it (see [`Evidence::unlike`]).
+    /// How unlike its good state the node is (see [`Evidence::unlike`]).
     pub unlike: Unlikeness,
     /// By how many standard deviations that is more than correct assemblies show (see [`strange::weigh`]).
     pub strangeness: f64,
@@ -246,7 +246,9 @@ impl<'a> Inspector<'a> {
 
     /// Log-likelihoods of all nodes.
     pub fn evidence(&self, photo: &Photo, pose: &Pose) -> Vec<Evidence> {
-        let looks = self.looks(photo, pose);
+        (self.listener)(Part::Windows);
+        let pyramid = self.prepared.pyramid(&photo.light);
+        let looks = self.looks(&pyramid, pose);
         let factor = |node: usize| f64::from(self.prepared.nodes[node].window.frame.factor);
         let shift = |(i, look): (usize, &Look)| look.best_shift().map(|v| v * factor(i));
         let shifts: Vec<[f64; 2]> = looks.iter().enumerate().map(shift).collect();
@@ -258,10 +260,8 @@ impl<'a> Inspector<'a> {
     }
 
     /// Every node at a pose under its own hypotheses.
-    fn looks(&self, photo: &Photo, pose: &Pose) -> Vec<Look<'_>> {
-        (self.listener)(Part::Windows);
-        let pyramid = self.prepared.pyramid(&photo.light);
-        let look = |(i, node): (usize, &NodeImages)| {
+    fn looks<'l>(&'l self, pyramid: &'l Pyramid, pose: &Pose) -> Vec<Look<'l>> {
+        let look = |(i, node): (usize, &'l NodeImages)| {
             let reduced = pyramid.at(node.window.frame.factor);
             node.look(&self.densities[i][..node.own], &self.light, reduced, &self.camera, pose, self.listener)
         };
@@ -298,7 +298,7 @@ impl<'a> Inspector<'a> {
             against,
             best_fault: fault.map_or_else(String::new, |h| node.hypotheses[h].fault.clone()),
             inside: evidence.inside,
-            unlike: evidence.unlike,
+            unlike: evidence.unlike.clone(),
             strangeness: 0.0,
             // What is no number is no proof of anything.
             faulty: score.is_nan() || score < 0.0,

@@ -6,12 +6,13 @@ use super::camera::Camera;
 use super::density::{Density, Floor, mean_of};
 use super::grid::Grid;
 use super::light::{Light, LightEvidence};
-use super::look::{Look, Shifted};
+use super::look::Look;
 use super::model::{Image, Model, Node};
 use super::parts::{Listener, Part, nobody};
 use super::pose::Pose;
 use super::settle::Expected;
-use super::strange::Unlikeness;
+use super::sight::{Glance, Reduced, Sight};
+use super::strange::{self, Unlikeness};
 use super::window::{Frame, Stencil, Window, mask_of};
 
 /// Coefficients overlap, and what a model gets wrong it gets wrong along whole edges: a node's count for this many independent
@@ -24,6 +25,7 @@ pub const CLIP: f32 = 0.98;
 pub struct NodeImages {
     pub window: Window,
     pub stencil: Stencil,
+    glance: Option<Glance>,
     /// Pixels of the window that no fault of the component changes.
     surroundings: Vec<bool>,
     /// Standard deviation of the node's shift (node px).
@@ -52,8 +54,10 @@ impl NodeImages {
         if levelled {
             wanted.iter_mut().zip(&surroundings).for_each(|(wanted, outside)| *wanted |= outside);
         }
+        let window = Window::new(Frame::of(node), nominal, home)?.masked(wanted);
         Some(NodeImages {
-            window: Window::new(Frame::of(node), nominal, home)?.masked(wanted),
+            glance: Glance::new(&window, &stencil),
+            window,
             stencil,
             surroundings,
             spread: node.spread.map(|s| s / f64::from(node.factor)),
@@ -95,7 +99,7 @@ impl NodeImages {
         let mut densities = self.rendered(light, noise);
         let level = |window: &Grid| self.stencil.coefficients(&light.level(window.clone(), &self.surroundings));
         let levelled: Vec<Vec<f32>> = references.iter().map(level).collect();
-        let unlike = levelled.iter().map(|z| self.stencil.highest_means(&densities[0].surprise(z))).collect();
+        let unlike = levelled.iter().map(|z| self.unlike(&densities[0].surprise(z))).collect();
         let gaps: Vec<Vec<f32>> = levelled.iter().map(|z| densities[0].gap(z)).collect();
         if !gaps.is_empty() {
             let shares: Vec<Vec<f32>> = densities.iter().map(|d| d.shared(&densities[0])).collect();
@@ -104,11 +108,18 @@ impl NodeImages {
         (densities, unlike)
     }
 
+    /// How unlike the good state a correct assembly is, given its surprise: glints wander, so a square may show what those
+    /// beside it showed.
+    fn unlike(&self, surprise: &[f32]) -> Unlikeness {
+        strange::unlikeness(&self.stencil.widened(&self.stencil.square_means(surprise)))
+    }
+
     /// The densities as renders alone make them.
     fn rendered(&self, light: &Light, noise: f64) -> Vec<Density> {
         let noise = noise / f64::from(self.window.frame.factor);
         let good = self.lit(0, light);
-        let floor = Floor::new(&self.stencil.levels, noise, &mean_of(&good));
+        let searched = self.glance.as_ref().map(|g| g.cells.clone());
+        let floor = Floor::new(&self.stencil.levels, noise, &mean_of(&good), searched);
         let density = |hypothesis: usize| {
             let samples = if hypothesis == 0 { good.clone() } else { self.lit(hypothesis, light) };
             Density::fit(&samples, self.lamp_columns(hypothesis, light), &floor)
@@ -139,7 +150,7 @@ pub struct Evidence {
     pub inside: f64,
     /// Best shift under the good state (node px).
     pub shift: [f64; 2],
-    /// How far from the first density the node is where it is farthest: mean of [`Density::surprise`] in a square.
+    /// How far from the first density the node is, square by square: mean of [`Density::surprise`].
     pub unlike: Unlikeness,
 }
 
@@ -150,19 +161,19 @@ fn surroundings(mask: &[Vec<bool>]) -> Vec<bool> {
 }
 
 /// A photo reduced by every factor the nodes use.
-pub struct Pyramid(Vec<(u32, Grid)>);
+pub struct Pyramid(Vec<(u32, Reduced)>);
 
 impl Pyramid {
     pub fn new(light: &Grid, factors: impl Iterator<Item = u32>) -> Pyramid {
         let mut sorted: Vec<u32> = factors.collect();
         sorted.sort_unstable();
         sorted.dedup();
-        Pyramid(sorted.into_iter().map(|f| (f, light.reduced(f as usize))).collect())
+        Pyramid(sorted.into_iter().map(|f| (f, Reduced::new(light.reduced(f as usize)))).collect())
     }
 
     /// # Panics
     /// When the pyramid was not made for this factor.
-    pub fn at(&self, factor: u32) -> &Grid {
+    pub fn at(&self, factor: u32) -> &Reduced {
         &self.0.iter().find(|(f, _)| *f == factor).expect("a factor the pyramid was made for").1
     }
 }
@@ -170,22 +181,18 @@ impl Pyramid {
 impl NodeImages {
     /// The node in a photo at a pose, ready to be weighed under some densities (at least one).
     pub fn look<'a>(
-        &self,
+        &'a self,
         densities: &'a [Density],
-        light: &Light,
-        reduced: &Grid,
+        light: &'a Light,
+        reduced: &'a Reduced,
         camera: &Camera,
         pose: &Pose,
         listener: &'a Listener<'a>,
     ) -> Look<'a> {
         listener(Part::Windows);
-        let placed = self.window.place(camera, pose);
-        let inside = self.window.cut(reduced, &placed, [0.0, 0.0]).1;
-        let coefficients = |shift: [f64; 2]| {
-            let (image, _) = self.window.cut(reduced, &placed, shift);
-            self.stencil.coefficients(&light.level(image, &self.surroundings))
-        };
-        Look::new(densities, self.spread, self.window.frame.factor, inside, &coefficients, listener)
+        let node = (&self.window, &self.stencil, self.glance.as_ref());
+        let sight = Sight::new(node, (light, &self.surroundings), reduced, (camera, pose));
+        Look::new(densities, self.spread, sight, listener)
     }
 
     /// Evidence for each density of a look; each re-aligns by itself within the local search. The first one's place is known as
@@ -197,9 +204,9 @@ impl NodeImages {
         let free = Expected { at, spread };
         let good = expected.map_or_else(|| look.likeliest(0, &free, 1.0), |e| look.likeliest(0, e, weight));
         let others = (1..look.densities.len()).map(|density| look.likeliest(density, &free, 1.0).0);
-        let Shifted { shift, ref coefficients } = look.shifted[good.1];
+        let (shift, coefficients) = (look.shift(good.1), look.coefficients(good.1));
         (look.listener)(Part::Unknown);
-        let unlike = self.stencil.highest_means(&look.densities[0].surprise(coefficients));
+        let unlike = strange::unlikeness(&self.stencil.square_means(&look.densities[0].surprise(coefficients)));
         let log_likelihoods = std::iter::once(good.0).chain(others).collect();
         Evidence { log_likelihoods, inside: look.inside, shift, unlike }
     }
@@ -209,7 +216,7 @@ impl NodeImages {
         &self,
         density: &Density,
         light: &Light,
-        reduced: &Grid,
+        reduced: &Reduced,
         camera: &Camera,
         pose: &Pose,
     ) -> [f64; 2] {
@@ -221,20 +228,20 @@ impl NodeImages {
         &self,
         light: &Light,
         noise: f64,
-        reduced: &Grid,
+        reduced: &Reduced,
         camera: &Camera,
         pose: &Pose,
     ) -> (Grid, [f64; 2]) {
         let good = &self.rendered(light, noise)[0];
         let shift = self.best_shift(good, light, reduced, camera, pose);
-        let window = self.window.cut(reduced, &self.window.place(camera, pose), shift).0;
+        let window = self.window.cut(&reduced.grid, &self.window.place(camera, pose), shift);
         (window, shift.map(|v| v * f64::from(self.window.frame.factor)))
     }
 
     /// The node's coefficients at a pose, and which of them touch clipped pixels.
-    pub fn observe(&self, reduced: &Grid, camera: &Camera, pose: &Pose) -> (Vec<f32>, Vec<bool>) {
+    pub fn observe(&self, reduced: &Reduced, camera: &Camera, pose: &Pose) -> (Vec<f32>, Vec<bool>) {
         let placed = self.window.place(camera, pose);
-        let (image, _) = self.window.cut(reduced, &placed, [0.0, 0.0]);
+        let image = self.window.cut(&reduced.grid, &placed, [0.0, 0.0]);
         (self.stencil.coefficients(&image), self.stencil.touching(&image, CLIP))
     }
 }

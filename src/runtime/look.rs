@@ -1,12 +1,13 @@
 //! A node in a photo at every shift of its local search.
 //!
-//! In: the node's coefficients as a function of the shift, densities. Out: the shift at which a density fits best under what is
+//! In: the node as the photo shows it at any shift, densities. Out: the shift at which a density fits best under what is
 //! known of the place. Whole px of the photo come first; only round the best of each density half px follow. Never decides.
 
 use super::density::Density;
 use super::parts::{Listener, Part};
 use super::settle::Expected;
-use std::cell::RefCell;
+use super::sight::Sight;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 
 /// Local search: shifts of up to this many standard deviations of the node's place, and at most so many px of the photo,
@@ -18,15 +19,18 @@ const FEW: f64 = 2.0;
 /// Shifts that Gaussian noise likes best, among which Student's decides.
 const SHORT_LIST: usize = 4;
 
-/// A node's coefficients at one shift (node px).
-pub(super) struct Shifted {
-    pub shift: [f64; 2],
-    pub coefficients: Vec<f32>,
+/// A node at one shift (node px).
+struct Shifted {
+    shift: [f64; 2],
+    /// The coefficients that a search asks, where these are not all.
+    some: Option<Vec<f32>>,
+    all: OnceCell<Vec<f32>>,
 }
 
 pub struct Look<'a> {
     pub(super) densities: &'a [Density],
-    pub(super) shifted: Vec<Shifted>,
+    sight: Sight<'a>,
+    shifted: Vec<Shifted>,
     /// Per density, shifts with its Gaussian log-likelihood there.
     fits: Vec<Vec<(usize, f64)>>,
     /// Per density and shift its log-likelihood under Student's noise, as far as it was asked for.
@@ -44,40 +48,38 @@ impl<'a> Look<'a> {
     pub(super) fn new(
         densities: &'a [Density],
         spread: [f64; 2],
-        factor: u32,
-        inside: f64,
-        coefficients: &dyn Fn([f64; 2]) -> Vec<f32>,
+        sight: Sight<'a>,
         listener: &'a Listener<'a>,
     ) -> Look<'a> {
         listener(Part::Windows);
-        let factor = f64::from(factor);
+        let (factor, inside) = (f64::from(sight.window.frame.factor), sight.inside());
         let spread = spread.map(|s| s * factor);
         let [columns, rows] = spread.map(|spread| steps(spread, factor));
         let whole = rows.iter().flat_map(|&y| columns.iter().map(move |&x| [x, y]));
-        let shifted = whole.map(|halves| seen(halves, factor, coefficients)).collect();
+        let shifted = whole.map(|halves| seen(halves, factor, &sight)).collect();
         let fits = vec![Vec::new(); densities.len()];
         let robust = RefCell::default();
-        let mut look = Look { densities, shifted, fits, robust, inside, spread, factor, listener };
+        let mut look = Look { densities, sight, shifted, fits, robust, inside, spread, factor, listener };
         listener(Part::Shifts);
         // One density at a time: it is read again and again and should stay near.
         for density in 0..densities.len() {
             (0..look.shifted.len()).for_each(|i| look.fit(density, i));
         }
         if spread.iter().all(|s| reach(*s) <= FEW) {
-            look.closer(coefficients);
+            look.closer();
         }
         look
     }
 
     /// Looks at what lies half a px beside the best shift of each density; the first one is tried on all of them.
-    fn closer(&mut self, coefficients: &dyn Fn([f64; 2]) -> Vec<f32>) {
+    fn closer(&mut self) {
         let mut taken: BTreeMap<[i32; 2], usize> = BTreeMap::new();
         for density in (0..self.densities.len()).rev() {
             for halves in self.round_best(density) {
                 let index = *taken.entry(halves).or_insert(self.shifted.len());
                 if index == self.shifted.len() {
                     (self.listener)(Part::Windows);
-                    self.shifted.push(seen(halves, self.factor, coefficients));
+                    self.shifted.push(seen(halves, self.factor, &self.sight));
                     (self.listener)(Part::Shifts);
                 }
                 if density > 0 {
@@ -89,7 +91,8 @@ impl<'a> Look<'a> {
     }
 
     fn fit(&mut self, density: usize, shift: usize) {
-        let fit = self.densities[density].searched(&self.shifted[shift].coefficients);
+        let asked = self.shifted[shift].some.as_deref().unwrap_or_else(|| self.coefficients(shift));
+        let fit = self.densities[density].searched(asked);
         self.fits[density].push((shift, fit));
     }
 
@@ -118,32 +121,57 @@ impl<'a> Look<'a> {
         (self.listener)(Part::Likelihood);
         let prior = |i: usize| weight * self.prior(i, expected);
         let mut quick: Vec<(f64, usize)> = self.fits[density].iter().map(|&(i, fit)| (fit + prior(i), i)).collect();
-        quick.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let better = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1));
+        quick.sort_by(|a, b| better(b, a));
+        quick.truncate(SHORT_LIST);
+        // Where a search asks some coefficients only, these choose among the listed as well.
+        let some = |&(_, i): &(f64, usize)| {
+            let asked = self.shifted[i].some.as_deref()?;
+            Some((self.densities[density].searched_student(asked) + prior(i), i))
+        };
+        if let Some(of_some) = quick.iter().map(some).collect::<Option<Vec<_>>>() {
+            quick = of_some.into_iter().max_by(better).into_iter().collect();
+        }
         let robust = |&(_, i): &(f64, usize)| (self.student(density, i) + prior(i), i);
-        let listed = quick.iter().take(SHORT_LIST).map(robust);
-        listed.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))).unwrap_or((f64::NEG_INFINITY, 0))
+        quick.iter().map(robust).max_by(better).unwrap_or((f64::NEG_INFINITY, 0))
     }
 
     /// A density's log-likelihood at a shift, worked out once.
     fn student(&self, density: usize, shift: usize) -> f64 {
         let known = self.robust.borrow().get(&(density, shift)).copied();
         known.unwrap_or_else(|| {
-            let value = self.densities[density].student(&self.shifted[shift].coefficients);
+            let all = self.coefficients(shift);
+            (self.listener)(Part::Likelihood);
+            let value = self.densities[density].student(all);
             self.robust.borrow_mut().insert((density, shift), value);
             value
         })
     }
 
+    /// All coefficients at a shift, worked out once.
+    pub(super) fn coefficients(&self, shift: usize) -> &[f32] {
+        let shifted = &self.shifted[shift];
+        shifted.all.get_or_init(|| {
+            (self.listener)(Part::Windows);
+            self.sight.all(shifted.shift)
+        })
+    }
+
+    /// A shift in node px.
+    pub(super) fn shift(&self, shift: usize) -> [f64; 2] {
+        self.shifted[shift].shift
+    }
+
     /// The shift (node px) at which the first density fits best.
     pub fn best_shift(&self) -> [f64; 2] {
-        self.shifted[self.likeliest(0, &self.free(), 1.0).1].shift
+        self.shift(self.likeliest(0, &self.free(), 1.0).1)
     }
 }
 
-/// A node's coefficients at a shift in half px of the photo.
-fn seen(halves: [i32; 2], factor: f64, coefficients: &dyn Fn([f64; 2]) -> Vec<f32>) -> Shifted {
+/// A node at a shift in half px of the photo.
+fn seen(halves: [i32; 2], factor: f64, sight: &Sight) -> Shifted {
     let shift = halves.map(|v| f64::from(v) / 2.0 / factor);
-    Shifted { shift, coefficients: coefficients(shift) }
+    Shifted { shift, some: sight.some(shift), all: OnceCell::new() }
 }
 
 /// How far to look along one axis for a standard deviation (px of the photo).

@@ -11,6 +11,10 @@ pub fn sin_cos(angle: f64) -> (f64, f64) {
 }
 
 /// Natural logarithm.
+pub fn exp(x: f64) -> f64 {
+    libm::exp(x)
+}
+
 pub fn ln(x: f64) -> f64 {
     libm::log(x)
 }

@@ -26,5 +26,6 @@ pub mod report;
 pub mod rig;
 pub mod row;
 pub mod settle;
+pub mod sight;
 pub mod strange;
 pub mod window;

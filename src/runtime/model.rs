@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The format this version writes, and the only one it reads so far.
-pub const FORMAT: u32 = 4;
+pub const FORMAT: u32 = 5;
 /// Sizes of squares in which a node is held against its good state: the cells of its coarsest level and of the one before.
-pub const SCALES: usize = 2;
+pub const SCALES: usize = 3;
 /// Larger files are refused before they are parsed (bytes).
 const LARGEST_FILE: usize = 128 << 20;
 /// Caps on counts, far above any real station.
@@ -182,13 +182,24 @@ pub struct Node {
     /// Scores of held-out renders, ascending: log-likelihood ratios per coefficient, less the error mode's threshold.
     pub good_scores: Vec<f64>,
     pub fault_scores: Vec<f64>,
-    /// Mean and standard deviation of the logarithm of how unlike its good state a held-out good render is in the square where it
-    /// is least like it: for the squares of the coarsest level, then for those of the level before.
-    pub usual: Vec<[f64; 2]>,
+    /// What held-out good renders show of what this model does not know: for the squares of the coarsest level, then for those of
+    /// the levels before; all of them, or none in a model that was not held against renders.
+    pub usual: Vec<Usual>,
     /// The first is the good state.
     pub hypotheses: Vec<Hypothesis>,
     /// What the good state looks like beside the faults of other components.
     pub disturbed: Vec<Disturbed>,
+}
+
+/// How unlike its good state a node may be in the squares of one level (see [`super::strange`]).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Usual {
+    /// Per square the middle of what held-out good renders show, in steps.
+    pub middle: Row,
+    /// Of the largest excess over that in a good render: its middle, and its standard deviation upwards beyond what the nodes of
+    /// a photo have in common (logarithms).
+    pub excess: [f64; 2],
 }
 
 /// The good state of a component while another is faulty.
@@ -345,7 +356,8 @@ impl Node {
         ensure(self.spread.iter().all(|s| s.is_finite() && *s > 0.0), "node spread out of range")?;
         ensure(self.hypotheses.iter().all(|h| !h.threshold.is_nan()), "threshold out of range")?;
         ensure(matches!(self.usual.len(), 0 | SCALES), "node usual sizes")?;
-        ensure(self.usual.iter().all(|[m, s]| m.is_finite() && s.is_finite() && *s > 0.0), "node usual out of range")?;
+        let in_range = |u: &Usual| u.excess.iter().all(|v| v.is_finite()) && u.excess[1] > 0.0;
+        ensure(self.usual.iter().all(in_range), "node usual out of range")?;
         ensure(self.parent.is_none_or(|p| (p as usize) < nodes), "node parent out of range")?;
         ensure(self.disturbs.iter().all(|&d| (d as usize) < nodes), "disturbed node out of range")?;
         ensure(self.mask.len() == height as usize, "mask rows")?;

@@ -20,7 +20,7 @@ const DIGIT: u8 = b'0';
 const ESCAPED: [(u8, u8); 2] = [(b'"', b'{'), (b'\\', b'}')];
 
 /// Grey values from left to right.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Row(pub Vec<u16>);
 
 impl Row {

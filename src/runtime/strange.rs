@@ -1,23 +1,26 @@
 //! Nodes that look like nothing the model knows: a chip, a foreign object, a part of some other kind.
 //!
-//! In: how unlike its good state each node of a photo is where it is least like it, what held-out renders of correct
-//! assemblies show there, and what the calibration photo showed. Out: per node by how many standard deviations that is more
-//! than it should be, and the node that stands out. Never says what it is.
+//! In: how unlike its good state each node of a photo is, square by square, what held-out renders of correct assemblies show
+//! there, and what the calibration photo showed. Out: per node by how many standard deviations its oddest square is odder than
+//! it should be, and the node that stands out. Never says what it is.
 //!
-//! Logarithms are compared: unlikeness is a mean of squares' logarithms, so what a station adds to it, it adds by a factor.
-//! A model that is not quite this station's makes all nodes of a photo less like themselves; only what is more than their
-//! middle counts.
+//! A square is held against itself: a bright rim is never quite as rendered, a plain face nearly always. Logarithms are
+//! compared: unlikeness is a mean of squares' logarithms, so what a station adds to it, it adds by a factor. A model that is
+//! not quite this station's makes all nodes of a photo less like themselves; only what is more than their middle counts.
 
 use super::inspect::NodeReport;
 use super::linear;
 use super::math;
-use super::model::{Node, SCALES};
+use super::model::{Node, SCALES, Usual};
+use super::row::Row;
 
-/// Mean surprise in the least likely square of each size.
-pub type Unlikeness = [f64; SCALES];
+/// Mean surprise in every square of each size: steps of its logarithm from [`FAINTEST`], counted from 1; 0 where a square holds
+/// too few coefficients.
+pub type Unlikeness = [Row; SCALES];
 
-/// Beyond this many standard deviations a node is strange: once in four thousand nodes if the logarithms were normal.
-const LIMIT: f64 = 3.5;
+/// Beyond this many standard deviations of renders a node is strange: of hundreds of squares the oddest counts, and photos
+/// scatter more than renders.
+const LIMIT: f64 = 5.0;
 /// No square is strange whose coefficients lie, in the mean, nearer to what is expected than this (the surprise of one that
 /// is 1.4 standard deviations off).
 const LEAST: f64 = 1.0;
@@ -31,26 +34,55 @@ const LEAST_DEVIATION: f64 = 0.25;
 const ONE_DEVIATION_UP: f64 = 0.84;
 /// What has no logarithm.
 const FAINTEST: f64 = 1e-3;
+/// Of the logarithms that are kept.
+const STEP: f64 = 0.05;
 
 /// The fault of a node that looks neither as it should nor as when faulty in any way that the compiler thought of.
 pub const UNKNOWN: &str = "unknown";
 
-/// The mean of several photos'.
-pub fn mean(all: &[Unlikeness]) -> Option<Unlikeness> {
-    let count = all.len() as f64;
-    (!all.is_empty()).then(|| std::array::from_fn(|scale| all.iter().map(|u| u[scale]).sum::<f64>() / count))
+/// Of the mean surprise in the squares of each size; NaN where there is none.
+pub fn unlikeness(means: &[Vec<f64>; SCALES]) -> Unlikeness {
+    let code = |&mean: &f64| if mean.is_nan() { 0 } else { code(math::ln(mean.max(FAINTEST))) };
+    means.each_ref().map(|means| Row(means.iter().map(code).collect()))
 }
 
-/// Per node and size of squares the middle of the logarithms of what good photos show, and the deviation upwards of what is
-/// left of them beyond what a photo's nodes have in common (see [`weigh`]). `photos` holds, per photo, what each node shows
-/// and what it showed at calibration.
-pub fn usual(photos: &[(Vec<Unlikeness>, &[Option<Unlikeness>])]) -> Vec<Vec<[f64; 2]>> {
+/// A logarithm as it is kept.
+fn code(log: f64) -> u16 {
+    1 + ((log - math::ln(FAINTEST)) / STEP).round() as u16
+}
+
+/// The logarithm that a code stands for; `None` for a square with too few coefficients.
+fn log(code: u16) -> Option<f64> {
+    (code > 0).then(|| math::ln(FAINTEST) + f64::from(code - 1) * STEP)
+}
+
+/// The mean of several photos'.
+pub fn mean(all: &[Unlikeness]) -> Option<Unlikeness> {
+    let first = all.first()?;
+    let square = |scale: usize, k: usize| {
+        let sum: u32 = all.iter().map(|u| u32::from(u[scale].0[k])).sum();
+        (sum / all.len() as u32) as u16
+    };
+    Some(std::array::from_fn(|scale| Row((0..first[scale].0.len()).map(|k| square(scale, k)).collect())))
+}
+
+/// Per node and size of squares what good photos show. `photos` holds, per photo, what each node shows and what it showed at
+/// calibration.
+pub fn usual(photos: &[(Vec<Unlikeness>, &[Option<Unlikeness>])]) -> Vec<Vec<Usual>> {
     let nodes = photos.iter().map(|(unlike, _)| unlike.len()).min().unwrap_or(0);
-    let mut usual = vec![vec![[0.0, LEAST_DEVIATION]; SCALES]; nodes];
+    let start = |node: usize, scale: usize| {
+        let middle = middle(&photos.iter().map(|(unlike, _)| &unlike[node][scale]).collect::<Vec<_>>());
+        Usual { middle, excess: [0.0, LEAST_DEVIATION] }
+    };
+    let mut usual: Vec<Vec<Usual>> = (0..nodes).map(|n| (0..SCALES).map(|scale| start(n, scale)).collect()).collect();
     for scale in 0..SCALES {
         for node in 0..nodes {
-            let mut logs: Vec<f32> = photos.iter().map(|(unlike, _)| log(unlike[node][scale]) as f32).collect();
-            usual[node][scale][0] = f64::from(linear::median(&mut logs));
+            let of = |(unlike, calibrated): &(Vec<Unlikeness>, &[Option<Unlikeness>])| {
+                let before = calibrated.get(node).and_then(Option::as_ref);
+                excess(&unlike[node][scale], &usual[node][scale].middle, before.map(|b| &b[scale])) as f32
+            };
+            let mut own: Vec<f32> = photos.iter().map(of).collect();
+            usual[node][scale].excess[0] = f64::from(linear::median(&mut own));
         }
         let beyond: Vec<Vec<f64>> =
             photos.iter().map(|(unlike, calibrated)| beyond(unlike, &usual, calibrated, scale)).collect();
@@ -60,43 +92,64 @@ pub fn usual(photos: &[(Vec<Unlikeness>, &[Option<Unlikeness>])]) -> Vec<Vec<[f6
             let high = own[((own.len() - 1) as f64 * ONE_DEVIATION_UP).round() as usize];
             // Tails may be heavier than a normal variable's: no photo of these is strange.
             let highest = own[own.len() - 1] / LIMIT;
-            usual[node][scale][1] = high.max(highest).max(LEAST_DEVIATION);
+            usual[node][scale].excess[1] = high.max(highest).max(LEAST_DEVIATION);
         }
     }
     usual
 }
 
-fn log(unlikeness: f64) -> f64 {
-    math::ln(unlikeness.max(FAINTEST))
+/// Per square the median of several photos.
+fn middle(all: &[&Row]) -> Row {
+    let squares = all.iter().map(|row| row.0.len()).min().unwrap_or(0);
+    let square = |k: usize| {
+        let mut codes: Vec<u16> = all.iter().map(|row| row.0[k]).collect();
+        codes.sort_unstable();
+        codes[codes.len() / 2]
+    };
+    Row((0..squares).map(square).collect())
 }
 
-/// By how much the logarithm of what each node shows exceeds what it may show: its own usual, and more by as much as the middle
-/// of the photo's other nodes shows more than theirs, or as it did itself at calibration. 0 where nothing is known of the
-/// node.
-fn beyond(unlike: &[Unlikeness], usual: &[Vec<[f64; 2]>], calibrated: &[Option<Unlikeness>], scale: usize) -> Vec<f64> {
-    let excess = |i: usize, u: &Unlikeness| Some(log(u[scale]) - usual.get(i)?.get(scale)?[0]);
-    let all: Vec<Option<f64>> = unlike.iter().enumerate().map(|(i, u)| excess(i, u)).collect();
+/// By how much the logarithm of what a square shows exceeds what it usually shows, or what it showed at calibration, where it
+/// does so most; 0 where no square is unlike.
+fn excess(unlike: &Row, middle: &Row, calibrated: Option<&Row>) -> f64 {
+    let squares = unlike.0.iter().zip(&middle.0).enumerate();
+    let of = |(k, (&shown, &usual)): (usize, (&u16, &u16))| {
+        let shown = log(shown).filter(|shown| *shown >= math::ln(LEAST))?;
+        let before = calibrated.and_then(|row| log(*row.0.get(k)?));
+        Some(shown - before.map_or(log(usual)?, |before| before.max(log(usual).unwrap_or(before))))
+    };
+    squares.filter_map(of).fold(0.0, f64::max)
+}
+
+/// By how much each node's excess is more than usual, and than the middle of what the photo's other nodes have more than
+/// theirs. 0 where nothing is known of the node.
+fn beyond(unlike: &[Unlikeness], usual: &[Vec<Usual>], calibrated: &[Option<Unlikeness>], scale: usize) -> Vec<f64> {
+    let more = |(i, unlike): (usize, &Unlikeness)| {
+        let usual = usual.get(i)?.get(scale)?;
+        let before = calibrated.get(i).and_then(Option::as_ref).map(|before| &before[scale]);
+        Some(excess(&unlike[scale], &usual.middle, before) - usual.excess[0])
+    };
+    let all: Vec<Option<f64>> = unlike.iter().enumerate().map(more).collect();
     let of = |i: usize| -> Option<f64> {
         let mut others: Vec<f32> =
             (0..all.len()).filter(|&k| k != i).filter_map(|k| all[k]).map(|e| e as f32).collect();
         let common = if others.is_empty() { 0.0 } else { f64::from(linear::median(&mut others)) };
-        let before = calibrated.get(i).copied().flatten().and_then(|u| excess(i, &u)).unwrap_or(0.0);
-        Some(all[i]? - common.max(before).max(0.0))
+        Some(all[i]? - common.max(0.0))
     };
     (0..all.len()).map(|i| of(i).unwrap_or(0.0)).collect()
 }
 
-/// Writes every node's strangeness: standard deviations beyond what it may show, 0 where it is not even unlike. `calibrated`
-/// holds what each node showed in the calibration photos, the mean of them.
+/// Writes every node's strangeness: standard deviations beyond what it may show. `calibrated` holds what each node showed in the
+/// calibration photos, the mean of them.
 pub fn weigh(nodes: &mut [NodeReport], of: &[Node], calibrated: &[Option<Unlikeness>]) {
-    let unlike: Vec<Unlikeness> = nodes.iter().map(|n| n.unlike).collect();
-    let usual: Vec<Vec<[f64; 2]>> = of.iter().map(|n| n.usual.clone()).collect();
+    let unlike: Vec<Unlikeness> = nodes.iter().map(|n| n.unlike.clone()).collect();
+    let usual: Vec<Vec<Usual>> = of.iter().map(|n| n.usual.clone()).collect();
     nodes.iter_mut().for_each(|n| n.strangeness = 0.0);
     for scale in 0..SCALES {
         let beyond = beyond(&unlike, &usual, calibrated, scale);
-        let known = (0..nodes.len()).filter(|&i| usual[i].len() > scale && unlike[i][scale] >= LEAST);
-        for i in known {
-            nodes[i].strangeness = nodes[i].strangeness.max(beyond[i] / (usual[i][scale][1] * of_middle(nodes.len())));
+        for i in (0..nodes.len()).filter(|&i| usual[i].len() > scale) {
+            let deviation = usual[i][scale].excess[1] * of_middle(nodes.len());
+            nodes[i].strangeness = nodes[i].strangeness.max(beyond[i] / deviation);
         }
     }
     for (i, node) in nodes.iter_mut().enumerate() {
@@ -104,12 +157,18 @@ pub fn weigh(nodes: &mut [NodeReport], of: &[Node], calibrated: &[Option<Unliken
     }
 }
 
+/// The highest of a node's largest squares.
+fn highest(unlike: &Unlikeness) -> f64 {
+    unlike[0].0.iter().max().and_then(|code| log(*code)).map_or(0.0, math::exp)
+}
+
 /// Renders of few draws leave much room for what they have not shown; but no square of a correct assembly is far from all that
 /// was rendered, unless the whole photo is: how far it is of what decides (1 at the limit). A lone node has nothing to be
 /// held against.
 fn far(unlike: &[Unlikeness], node: usize) -> f64 {
-    let mut others: Vec<f32> = (0..unlike.len()).filter(|&k| k != node).map(|k| unlike[k][0] as f32).collect();
-    if others.is_empty() { 0.0 } else { unlike[node][0] / (FAR + COMMON * f64::from(linear::median(&mut others))) }
+    let mut others: Vec<f32> = (0..unlike.len()).filter(|&k| k != node).map(|k| highest(&unlike[k]) as f32).collect();
+    let common = |others: &mut Vec<f32>| FAR + COMMON * f64::from(linear::median(others));
+    if others.is_empty() { 0.0 } else { highest(&unlike[node]) / common(&mut others) }
 }
 
 /// What the scatter of the other nodes' median adds to a deviation from it: its variance is π/2 of the mean's.
@@ -128,61 +187,89 @@ pub fn strangest(nodes: &[NodeReport]) -> Option<usize> {
 mod tests {
     use super::*;
 
-    fn photo(factors: &[f64]) -> Vec<Unlikeness> {
-        factors.iter().map(|f| [2.0 * f; SCALES]).collect()
+    /// A node of four squares of each size that show this many times 0.4, and the last `odd` times that.
+    fn node(factor: f64, odd: f64) -> Unlikeness {
+        unlikeness(&std::array::from_fn(|_| vec![0.4 * factor, f64::NAN, 0.4 * factor, 0.4 * factor * odd]))
     }
 
-    fn strangeness(factors: &[f64], calibrated: &[f64]) -> Vec<f64> {
-        let usual = vec![vec![[2.0f64.ln(), 0.3]; SCALES]; factors.len()];
-        let calibrated: Vec<Option<Unlikeness>> = photo(calibrated).into_iter().map(Some).collect();
-        beyond(&photo(factors), &usual, &calibrated, 0).into_iter().map(|b| b / 0.3).collect()
+    fn usual_nodes(count: usize) -> Vec<Vec<Usual>> {
+        let middle = node(1.0, 1.0);
+        let of = |scale: usize| Usual { middle: middle[scale].clone(), excess: [0.3, 0.25] };
+        (0..count).map(|_| (0..SCALES).map(of).collect()).collect()
+    }
+
+    fn strangeness(photo: &[Unlikeness], calibrated: &[Unlikeness]) -> Vec<f64> {
+        let calibrated: Vec<Option<Unlikeness>> = calibrated.iter().cloned().map(Some).collect();
+        beyond(photo, &usual_nodes(photo.len()), &calibrated, 0).into_iter().map(|b| b / 0.25).collect()
+    }
+
+    fn nodes(count: usize, other: usize, unlike: Unlikeness) -> Vec<Unlikeness> {
+        (0..count).map(|i| if i == other { unlike.clone() } else { node(1.0, 1.0) }).collect()
     }
 
     #[test]
-    fn one_node_that_shows_more_than_the_others_is_strange() {
-        let as_ever = [1.0; 5];
-        let odd = strangeness(&[1.0, 1.1, 4.0, 0.9, 1.0], &as_ever);
+    fn a_node_with_an_odd_square_is_strange() {
+        let odd = strangeness(&nodes(5, 2, node(1.0, 8.0)), &nodes(5, 0, node(1.0, 1.0)));
         assert!(odd[2] > LIMIT, "{odd:?}");
         assert!(odd.iter().enumerate().all(|(i, s)| i == 2 || *s < 1.0), "{odd:?}");
     }
 
     #[test]
     fn what_all_nodes_of_a_photo_have_in_common_is_not_strange() {
-        let common = strangeness(&[4.0, 4.4, 4.0, 3.6, 4.0], &[1.0; 5]);
+        let photo: Vec<Unlikeness> = [8.0, 8.8, 8.0, 7.2, 8.0].map(|f| node(f, 1.0)).into();
+        let common = strangeness(&photo, &nodes(5, 0, node(1.0, 1.0)));
         assert!(common.iter().all(|s| s.abs() < 1.0), "{common:?}");
     }
 
+    /// The rim of a part is not as rendered at this station: at calibration no more than today. Another square of it is.
     #[test]
-    fn what_a_node_showed_at_calibration_is_not_strange() {
-        let known = strangeness(&[1.0, 1.1, 4.0, 0.9, 1.0], &[1.0, 1.0, 3.5, 1.0, 1.0]);
+    fn what_a_square_showed_at_calibration_is_not_strange_in_it() {
+        let rim = |other: f64| unlikeness(&std::array::from_fn(|_| vec![0.4 * other, f64::NAN, 0.4, 3.2]));
+        let known = strangeness(&nodes(5, 2, rim(1.0)), &nodes(5, 2, rim(1.0)));
         assert!(known.iter().all(|s| *s < 1.0), "{known:?}");
+        assert!(strangeness(&nodes(5, 2, rim(8.0)), &nodes(5, 2, rim(1.0)))[2] > LIMIT);
     }
 
     #[test]
     fn a_node_far_from_all_renders_is_strange_whatever_they_leave_open() {
-        let limit = |node: f64, others: f64| far(&[[node; SCALES], [others; SCALES]], 0);
-        assert!(limit(4.2, 0.5) > 1.0 && limit(4.0, 0.5) < 1.0 && limit(4.2, 1.0) < 1.0);
-        assert_eq!(far(&[[9.0; SCALES]], 0), 0.0);
+        let all = |v: f64| unlikeness(&std::array::from_fn(|_| vec![v; 2]));
+        let limit = |node: f64, others: f64| far(&[all(node), all(others)], 0);
+        assert!(limit(4.4, 0.5) > 1.0 && limit(3.9, 0.5) < 1.0 && limit(4.4, 1.0) < 1.0);
+        assert_eq!(far(&[all(9.0)], 0), 0.0);
     }
 
     #[test]
     fn a_lone_node_is_held_against_what_it_usually_shows() {
-        assert!(strangeness(&[4.0], &[1.0])[0] > LIMIT);
-        assert_eq!(beyond(&photo(&[4.0]), &[], &[], 0), [0.0], "nothing is known of it");
+        assert!(strangeness(&[node(1.0, 8.0)], &[node(1.0, 1.0)])[0] > LIMIT);
+        assert_eq!(beyond(&[node(1.0, 8.0)], &[], &[], 0), [0.0], "nothing is known of it");
     }
 
-    /// Logarithms of the nodes differ by a common term per photo, which is no deviation of theirs, and by 0, 0.5 or -0.5.
     #[test]
-    fn the_deviation_is_what_is_left_beyond_the_photos_common_term() {
-        let own = |photo: usize, node: usize| [0.0, 0.5, -0.5][(photo + node) % 3];
+    fn logarithms_come_back_to_half_a_step() {
+        for value in [1e-3, 0.07, 1.0, 3.3, 50.0] {
+            assert!((log(code(math::ln(value))).unwrap() - math::ln(value)).abs() <= STEP / 2.0 + 1e-12);
+        }
+        assert_eq!(unlikeness(&std::array::from_fn(|_| vec![f64::NAN]))[0].0, [0]);
+        assert_eq!(mean(&[node(1.0, 1.0), node(1.0, 1.0)]), Some(node(1.0, 1.0)));
+    }
+
+    /// Of good photos none is strange; each square is held against its own middle, the rest is scatter.
+    #[test]
+    fn no_good_photo_is_strange_by_what_is_learnt_of_them() {
+        let square =
+            |p: usize, n: usize, k: usize| [1.0, 2.0, 4.0][k] * (1.0 + 0.3 * ((p * 7 + n * 3 + k * 5) % 4) as f64);
         let unlike = |p: usize| -> Vec<Unlikeness> {
-            let common = (p % 5) as f64 - 2.0;
-            (0..30).map(|node| [(node as f64 / 10.0 + common + own(p, node)).exp(); SCALES]).collect()
+            (0..6).map(|n| unlikeness(&std::array::from_fn(|_| (0..3).map(|k| square(p, n, k)).collect()))).collect()
         };
-        let photos: Vec<_> = (0..30).map(|p| (unlike(p), &[][..])).collect();
-        for (node, of) in usual(&photos).iter().enumerate() {
-            assert!((of[0][0] - node as f64 / 10.0).abs() < 0.51, "{node} {of:?}");
-            assert!(of[0][1] < 1.1, "{node} {of:?}: without the common term it were 1.5 and more");
+        let photos: Vec<(Vec<Unlikeness>, &[Option<Unlikeness>])> = (0..30).map(|p| (unlike(p), &[][..])).collect();
+        let learnt = usual(&photos);
+        for (photo, calibrated) in &photos {
+            for scale in 0..SCALES {
+                for (beyond, of) in beyond(photo, &learnt, calibrated, scale).iter().zip(&learnt) {
+                    assert!(beyond / of[scale].excess[1] <= LIMIT + 1e-9);
+                    assert!(of[scale].excess[1] < 0.5, "squares of unlike height are no scatter: {of:?}");
+                }
+            }
         }
     }
 }

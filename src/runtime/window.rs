@@ -8,6 +8,7 @@ use super::grid::Grid;
 use super::haar::Integral;
 use super::model::Node;
 use super::pose::Pose;
+use std::collections::BTreeMap;
 
 /// Where a node lies in the nominal photo.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +56,22 @@ impl Window {
         Some(Window { frame, points, wanted })
     }
 
+    /// The same window in blocks of 2 × 2 px, each a pixel; what is left over at the right and the bottom is dropped.
+    pub fn blocks(&self) -> Window {
+        let [width, height] = self.frame.size.map(|s| s as usize);
+        let size = [width / 2, height / 2];
+        let mut points = Vec::with_capacity(size[0] * size[1]);
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let first = 2 * (y * width + x);
+                let four = [first, first + 1, first + width, first + width + 1];
+                points.push([0, 1, 2].map(|k| four.iter().map(|&i| self.points[i][k]).sum::<f64>() / 4.0));
+            }
+        }
+        let wanted = vec![true; points.len()];
+        Window { frame: Frame { size: size.map(|s| s as u32), ..self.frame }, points, wanted }
+    }
+
     /// The same window in which only these pixels are looked at: the others are cut as 0.
     pub fn masked(self, wanted: Vec<bool>) -> Window {
         Window { wanted, ..self }
@@ -69,26 +86,32 @@ impl Window {
         Placed(self.points.iter().zip(&self.wanted).map(place).collect())
     }
 
-    /// The node's image from a photo already reduced by the node's factor, moved by `shift` (node px). The second value is the
-    /// share of the wanted pixels inside the photo; those outside repeat their left neighbour.
-    pub fn cut(&self, reduced: &Grid, placed: &Placed, shift: [f64; 2]) -> (Grid, f64) {
+    /// Share of the wanted pixels inside a photo already reduced by the node's factor.
+    pub fn inside(&self, reduced: &Grid, placed: &Placed) -> f64 {
+        let seen = placed.0.iter().zip(&self.wanted).filter(|(_, wanted)| **wanted).map(|(p, _)| reduced.sample(*p));
+        let (mut inside, mut all) = (0usize, 0usize);
+        for value in seen {
+            all += 1;
+            inside += usize::from(value.is_some());
+        }
+        inside as f64 / all.max(1) as f64
+    }
+
+    /// The node's image from a photo already reduced by the node's factor, moved by `shift` (node px). Wanted pixels
+    /// outside the photo repeat their left neighbour.
+    pub fn cut(&self, reduced: &Grid, placed: &Placed, shift: [f64; 2]) -> Grid {
         let [width, height] = self.frame.size.map(|s| s as usize);
         let mut values = Vec::with_capacity(width * height);
-        let (mut last, mut inside, mut all) = (0.0, 0usize, 0usize);
+        let mut last = 0.0;
         for (p, &wanted) in placed.0.iter().zip(&self.wanted) {
             if !wanted {
                 values.push(0.0);
                 continue;
             }
-            all += 1;
-            if let Some(v) = reduced.sample([p[0] + shift[0], p[1] + shift[1]]) {
-                last = v;
-                inside += 1;
-            }
+            last = reduced.sample([p[0] + shift[0], p[1] + shift[1]]).unwrap_or(last);
             values.push(last);
         }
-        let share = inside as f64 / all.max(1) as f64;
-        (Grid::new(width, height, values), share)
+        Grid::new(width, height, values)
     }
 }
 
@@ -129,6 +152,14 @@ impl Stencil {
         stencil
     }
 
+    /// These cells, none of them the smallest, where a pixel is a block of 2 × 2. They are of one level.
+    pub fn in_blocks(&self, cells: &[usize]) -> Stencil {
+        let half = |c: &Cell| Cell { x: c.x / 2, y: c.y / 2, half: c.half / 2 };
+        let cells: Vec<Cell> = cells.iter().map(|&c| half(&self.cells[c])).collect();
+        let levels = std::iter::once(0..2 * cells.len()).collect();
+        Stencil { cells, levels }
+    }
+
     /// Number of coefficients.
     pub fn len(&self) -> usize {
         2 * self.cells.len()
@@ -162,11 +193,10 @@ impl Stencil {
         out
     }
 
-    /// The highest mean of a value per coefficient over the squares of the coarsest levels' cells (the coarsest first), each
-    /// with all coefficients of any level whose cell has its centre in it. Squares with few coefficients do not count.
-    pub fn highest_means<const SCALES: usize>(&self, values: &[f32]) -> [f64; SCALES] {
+    /// The mean of a value per coefficient over every square of the coarsest levels' cells (the coarsest first), each with all
+    /// coefficients of any level whose cell has its centre in it; NaN for squares with few coefficients.
+    pub fn square_means<const SCALES: usize>(&self, values: &[f32]) -> [Vec<f64>; SCALES] {
         const FEWEST: usize = 24;
-        let mut highest = [0.0f64; SCALES];
         let width = self.cells.iter().map(|c| c.x).max().unwrap_or(0) + 1;
         let height = self.cells.iter().map(|c| c.y).max().unwrap_or(0) + 1;
         let mut sums = Grid::filled(width, height, 0.0);
@@ -176,17 +206,34 @@ impl Stencil {
             counts.values[c.y * width + c.x] += 2.0;
         }
         let (sums, counts) = (Integral::new(&sums), Integral::new(&counts));
-        for (highest, level) in highest.iter_mut().zip(self.levels.iter().rev()) {
-            for s in &self.cells[level.start / 2..level.end / 2] {
-                let (x, y) = (s.x.saturating_sub(s.half), s.y.saturating_sub(s.half));
-                let ends = [(s.x + s.half + 1).min(width), (s.y + s.half + 1).min(height)];
-                let count = counts.between([x, y], ends);
-                if count >= FEWEST as f64 {
-                    *highest = highest.max(sums.between([x, y], ends) / count);
-                }
-            }
-        }
-        highest
+        let mean = |s: &Cell| {
+            let (x, y) = (s.x.saturating_sub(s.half), s.y.saturating_sub(s.half));
+            let ends = [(s.x + s.half + 1).min(width), (s.y + s.half + 1).min(height)];
+            let count = counts.between([x, y], ends);
+            if count >= FEWEST as f64 { sums.between([x, y], ends) / count } else { f64::NAN }
+        };
+        let mut levels = self.levels.iter().rev();
+        std::array::from_fn(|_| {
+            let level = levels.next().cloned().unwrap_or(0..0);
+            self.cells[level.start / 2..level.end / 2].iter().map(mean).collect()
+        })
+    }
+
+    /// Per square of [`Stencil::square_means`] the highest mean of it and of those that overlap it.
+    pub fn widened<const SCALES: usize>(&self, means: &[Vec<f64>; SCALES]) -> [Vec<f64>; SCALES] {
+        let mut levels = self.levels.iter().rev();
+        std::array::from_fn(|scale| {
+            let level = levels.next().cloned().unwrap_or(0..0);
+            let squares = &self.cells[level.start / 2..level.end / 2];
+            let at: BTreeMap<[usize; 2], f64> =
+                squares.iter().zip(&means[scale]).map(|(s, mean)| ([s.x, s.y], *mean)).collect();
+            let highest = |s: &Cell| {
+                let rows = [s.y - s.half, s.y, s.y + s.half];
+                let round = rows.iter().flat_map(|y| [s.x - s.half, s.x, s.x + s.half].map(|x| at.get(&[x, *y])));
+                round.flatten().copied().fold(f64::NAN, f64::max)
+            };
+            squares.iter().map(highest).collect()
+        })
     }
 
     /// True for the coefficients whose cell holds a pixel at or above `limit`.
@@ -224,4 +271,25 @@ pub fn runs_of(mask: &[Vec<bool>]) -> Vec<Vec<u32>> {
         out
     };
     mask.iter().map(runs).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_square_is_widened_to_those_that_overlap_it() {
+        let stencil = Stencil::new(&vec![vec![true; 40]; 40], 4);
+        // One cell of the smallest is off, far from the border.
+        let mut values = vec![0.0; stencil.len()];
+        let odd = stencil.cells.iter().position(|c| [c.x, c.y, c.half] == [20, 20, 1]).unwrap();
+        values[2 * odd] = 100.0;
+        let means: [Vec<f64>; 2] = stencil.square_means(&values);
+        let wide = stencil.widened(&means);
+        let count = |all: &Vec<f64>| all.iter().filter(|v| **v > 0.0).count();
+        for scale in 0..2 {
+            assert!(count(&means[scale]) > 0 && count(&wide[scale]) > count(&means[scale]), "{scale}");
+            assert!(wide[scale].iter().zip(&means[scale]).all(|(w, m)| w >= m));
+        }
+    }
 }

@@ -4,7 +4,7 @@ use super::edges::{self, Ground};
 use super::plan::{NodePlan, Plan};
 use super::shots::Shot;
 use super::synthesise::Shots;
-use crate::assembly::fault::{ErrorMode, FaultKind, Motion};
+use crate::assembly::fault::{ErrorMode, FaultKind, Motion, swept};
 use crate::design::model::Design;
 use crate::runtime::camera::{Camera, Vec3};
 use crate::runtime::grid::Grid;
@@ -14,6 +14,7 @@ use crate::runtime::locate::EdgePoint;
 use crate::runtime::model::{Disturbed, Hypothesis, Image, Lamp, Locator, Node, PointGroup, PointSet};
 use crate::runtime::pose::Pose;
 use crate::runtime::row::Row;
+use crate::runtime::sight::Reduced;
 use crate::runtime::window::{Window, runs_of};
 use crate::view::item_buffer::Mask;
 use crate::view::nodes::dilate;
@@ -98,8 +99,7 @@ fn samples<'a>(context: &'a Context, plan: &NodePlan) -> Vec<Sample<'a>> {
 fn sweep(motion: &Motion, low: f64, high: f64) -> String {
     match motion {
         Motion::Slide { from, to, .. } => {
-            let at = |share: f64| from + (to - from) * share;
-            format!("{:.1} .. {:.1} mm", at(low), at(high))
+            format!("{:.1} .. {:.1} mm", swept(*from, *to, low), swept(*from, *to, high))
         }
         Motion::Tilt(_) => "one side up".into(),
         _ => String::new(),
@@ -170,7 +170,7 @@ impl Cutter<'_> {
         let factor = (self.plan.frame.factor / self.context.plan.base) as usize;
         let of = |(shot, shift): (&&Shot, &[f64; 2])| {
             let placed = self.window.place(self.context.camera, &shot.pose);
-            shot.lamps.iter().map(|lamp| self.window.cut(&lamp.reduced(factor), &placed, *shift).0).collect()
+            shot.lamps.iter().map(|lamp| self.window.cut(&lamp.reduced(factor), &placed, *shift)).collect()
         };
         sample.shots.iter().zip(&sample.shifts).map(of).collect()
     }
@@ -186,7 +186,7 @@ impl Cutter<'_> {
             for (shot, shift) in sample.shots.iter().zip(&mut sample.shifts) {
                 let mut light = shot.lit(context.powers).reduced(factor);
                 light.values.iter_mut().for_each(|v| *v = v.min(1.0));
-                *shift = images.best_shift(density, &powers, &light, context.camera, &shot.pose);
+                *shift = images.best_shift(density, &powers, &Reduced::new(light), context.camera, &shot.pose);
             }
         }
         Some(())

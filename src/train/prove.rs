@@ -8,7 +8,7 @@ use super::stats::{lower_95, rate};
 use super::synthesise::{Draws, Shots};
 use super::verify::Judged;
 use super::{Job, Observer, Step, render, shots, verify};
-use crate::assembly::fault::Motion;
+use crate::assembly::fault::{Motion, swept};
 use crate::diag::Diagnostic;
 use crate::runtime::inspect::{Decision, Verdict};
 use crate::runtime::model::{Model, Promise};
@@ -118,7 +118,7 @@ impl Sizes {
                 let component = &job.design.components[job.modes[m].component].name;
                 for (taken, verdict) in shots.faulty[scene].iter().zip(&verdicts.faulty[scene]) {
                     let blamed = verdict.nodes.iter().any(|n| n.faulty && n.name == *component);
-                    row.push((from + (to - from) * taken.places[k], blamed));
+                    row.push((swept(from, to, taken.places[k]), blamed));
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! From what held-out renders scored to the thresholds of a node's error modes.
 //!
-//! In: log-likelihood ratios of good and faulty renders against every hypothesis of a node. Out: a threshold per hypothesis, the
-//! same for all of one error mode, and the node's scores. Never looks at an image.
+//! In: log-likelihood ratios of good and faulty renders against every hypothesis of a node. Out: a threshold per hypothesis and
+//! the node's scores. Never looks at an image.
 
 use super::stats::{normal_quantile, rounded};
 use crate::runtime::inspect;
@@ -11,6 +11,8 @@ use crate::runtime::model::Node;
 /// Share of the lowest goods and the highest faults left out when asking whether they overlap: photos in which the pose
 /// went wrong, which say nothing about the node.
 pub(super) const TRIM: f64 = 0.1;
+/// Fewer faulty renders say nothing of a hypothesis by themselves.
+const FEWEST: usize = 4;
 /// Share of a normal variable more than one standard deviation below its mean.
 const ONE_DEVIATION_DOWN: f64 = 0.16;
 
@@ -22,14 +24,20 @@ pub struct Seen {
 }
 
 /// Writes the thresholds and the scores into the node. `false_reject` is the node's share of what the spec allows. A mode
-/// that hardly differs from the good state must not make the node blind to one that does, so each has its own.
+/// that hardly differs from the good state must not make the node blind to one that does, nor a small fault to a large one: so
+/// each hypothesis has its own, from the renders of its mode that look most like it.
 pub fn set(node: &mut Node, seen: &Seen, false_reject: f64) {
-    let modes = seen.faulty.len().max(1) as f64;
+    let share = false_reject / node.hypotheses.len().saturating_sub(1).max(1) as f64;
     for (kind, faulty) in &seen.faulty {
         let own: Vec<usize> = (1..node.hypotheses.len()).filter(|&h| node.hypotheses[h].fault == *kind).collect();
-        let least = |against: &Vec<f64>| own.iter().map(|&h| against[h]).fold(f64::INFINITY, f64::min);
-        let limit = threshold(&sorted(&seen.good, least), &sorted(faulty, least), false_reject / modes, INDEPENDENT);
-        own.iter().for_each(|&h| node.hypotheses[h].threshold = rounded(limit));
+        for &h in &own {
+            let nearest = |against: &&Vec<f64>| own.iter().all(|&other| against[h] <= against[other]);
+            let alike: Vec<Vec<f64>> = faulty.iter().filter(nearest).cloned().collect();
+            let faulty = if alike.len() < FEWEST { faulty } else { &alike };
+            let against = |all: &Vec<f64>| all[h];
+            let limit = threshold(&sorted(&seen.good, against), &sorted(faulty, against), share, INDEPENDENT);
+            node.hypotheses[h].threshold = rounded(limit);
+        }
     }
     let score = |against: &Vec<f64>| rounded(inspect::score(node, against).1);
     let faulty: Vec<Vec<f64>> = seen.faulty.iter().flat_map(|(_, of)| of.iter().cloned()).collect();
@@ -46,8 +54,8 @@ fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
 /// The log-likelihood ratio below which a node counts as faulty in one way. Where good and faulty renders lie apart but below
 /// zero, the middle between them decides. Else its sign does, less what the promised rate of false rejects takes: of good
 /// renders a share `p0` falls below zero, and from there on likelihood ratios fall off as their own size says (a ratio of Λ is
-/// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap, ratios are not what they say, and the spread of the goods may
-/// take more.
+/// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap and that of the goods reaches below zero, ratios are not
+/// what they say, and the spread of the goods may take more.
 /// Ratios are natural logarithms, a ratio of 1 being that of `independent` coefficients' worth.
 /// Never a quantile of the goods: their few lowest scores say nothing about a photo's.
 pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independent: f64) -> f64 {
@@ -62,7 +70,7 @@ pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independ
     let middle = at_share(good, 0.5);
     let below_zero = below_zero(middle, middle - at_share(good, ONE_DEVIATION_DOWN));
     let by_ratio = -(below_zero / false_reject).ln().max(0.0) / independent;
-    if apart {
+    if apart || lowest > 0.0 {
         return by_ratio;
     }
     let mut distances: Vec<f64> = good.iter().map(|g| (g - middle).abs()).collect();
@@ -86,6 +94,8 @@ pub(super) fn at_share(sorted: &[f64], share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::runtime::model::Hypothesis;
+    use crate::runtime::model::tests::tiny;
 
     #[test]
     fn the_sign_decides_where_renders_lie_apart() {
@@ -105,6 +115,22 @@ mod tests {
             threshold(&good, &[-0.8, -0.7, -0.6, -0.5], 1e-5, INDEPENDENT) < limit,
             "a stricter promise costs more"
         );
+    }
+
+    /// Of a sweep the large half lies apart, the small half does not: it alone has the spread's threshold.
+    #[test]
+    fn a_small_fault_hides_no_large_one() {
+        let good: Vec<Vec<f64>> =
+            [-0.1, -0.02, 0.0, 0.05, 0.1, 0.15].iter().map(|&small| vec![0.0, small, 0.5 + small]).collect();
+        let small = [-0.3, -0.2, -0.1, 0.0, 0.05].map(|v| vec![0.0, v, v + 0.3]);
+        let large = [-0.9, -0.8, -0.7, -0.6, -0.5].map(|v| vec![0.0, v + 0.4, v]);
+        let faulty = vec![("not seated".to_string(), small.into_iter().chain(large).collect())];
+        let mut node = tiny().nodes.remove(0);
+        let of = |fault: &str| Hypothesis { fault: fault.into(), ..node.hypotheses[0].clone() };
+        node.hypotheses = ["good", "not seated", "not seated"].map(of).into();
+        set(&mut node, &Seen { good, faulty }, 1e-3);
+        let limits: Vec<f64> = node.hypotheses.iter().map(|h| h.threshold).collect();
+        assert!(limits[1] < -0.2 && limits[2] > -0.1, "{limits:?}");
     }
 
     #[test]

@@ -18,7 +18,7 @@ use crate::runtime::camera::let_through;
 use crate::runtime::grid::Grid;
 use crate::runtime::inspect::{self, Decision, Inspector, Verdict};
 use crate::runtime::light::{range, within};
-use crate::runtime::model::{Lamp, ModeRate, Model, Promise};
+use crate::runtime::model::{Lamp, ModeRate, Model, Promise, Usual};
 use crate::runtime::photo::Photo;
 use crate::runtime::pose::Installation;
 use crate::runtime::strange::{self, Unlikeness};
@@ -278,11 +278,11 @@ fn set_usual(model: &mut Model, judged: &[Judged]) {
     let mut photos: Vec<(Vec<Unlikeness>, &[Option<Unlikeness>])> = Vec::new();
     for j in judged {
         for verdict in j.good.iter().filter(|v| v.nodes.len() == model.nodes.len()) {
-            photos.push((verdict.nodes.iter().map(|n| n.unlike).collect(), &j.calibrated));
+            photos.push((verdict.nodes.iter().map(|n| n.unlike.clone()).collect(), &j.calibrated));
         }
     }
     for (node, usual) in model.nodes.iter_mut().zip(strange::usual(&photos)) {
-        node.usual = usual.into_iter().map(|of| of.map(rounded)).collect();
+        node.usual = usual.into_iter().map(|of| Usual { excess: of.excess.map(rounded), ..of }).collect();
     }
 }
 

@@ -6,6 +6,10 @@ use crate::diag::{Diagnostic, Fix, Severity, Sources};
 use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Group, Level, Patch, Renderer, Snippet};
 
+/// Of a fix in more places than this, only the first are shown.
+const MOST_SHOWN: usize = 6;
+const FIRST_SHOWN: usize = 4;
+
 /// Each diagnostic with its piece of the source, and a line that counts them. Empty when there are none.
 pub fn human(sources: &Sources, diagnostics: &[Diagnostic], colour: bool) -> String {
     let renderer = if colour { Renderer::styled() } else { Renderer::plain() }.decor_style(DecorStyle::Ascii);
@@ -53,14 +57,18 @@ fn group<'a>(sources: &'a Sources, diagnostic: &'a Diagnostic) -> Group<'a> {
 /// The lines a fix changes, as they would be.
 fn patched<'a>(sources: &'a Sources, fix: &'a Fix) -> Group<'a> {
     let mut group = Group::with_title(Level::HELP.secondary_title(&fix.title));
+    let shown = if fix.edits.len() > MOST_SHOWN { FIRST_SHOWN } else { fix.edits.len() };
     for (index, (name, text)) in sources.files.iter().enumerate() {
-        let edits = fix.edits.iter().filter(|edit| edit.span.file as usize == index);
+        let edits = fix.edits[..shown].iter().filter(|edit| edit.span.file as usize == index);
         let patches: Vec<Patch> = edits.map(|e| Patch::new(bytes(text, e.span), e.text.as_str())).collect();
         if !patches.is_empty() {
             group = group.element(Snippet::source(text.as_str()).path(name).patches(patches));
         }
     }
-    group
+    match fix.edits.len() - shown {
+        0 => group,
+        rest => group.element(Level::NOTE.message(format!("and in {rest} more places"))),
+    }
 }
 
 /// Whether all edits lie in texts that are there, in their order and apart.
@@ -91,6 +99,7 @@ fn summary(diagnostics: &[Diagnostic]) -> String {
 mod tests {
     use super::super::tests::example;
     use super::*;
+    use crate::diag::{Applicability, Edit, Span};
 
     #[test]
     fn human_text() {
@@ -115,5 +124,24 @@ help: name it `a_2`
         assert_eq!(human(&sources, &diagnostics, false), expected);
         assert!(human(&sources, &diagnostics, true).contains("\u{1b}["));
         assert_eq!(human(&sources, &[], false), "");
+    }
+
+    #[test]
+    fn of_a_fix_in_many_places_the_first_are_shown() {
+        let text = "a;\n".repeat(9);
+        let sources = Sources { files: vec![("x.gng".into(), text.clone())] };
+        let place = |i: u32| Span { file: 0, start: 3 * i + 1, end: 3 * i + 2 };
+        let edits = |count: u32| (0..count).map(|i| Edit { span: place(i), text: String::new() }).collect::<Vec<_>>();
+        let shown = |count: u32| {
+            let fix = Fix {
+                title: "remove the `;`".into(),
+                edits: edits(count),
+                applicability: Applicability::MachineApplicable,
+            };
+            let diagnostic = Diagnostic { fixes: vec![fix], ..Diagnostic::error("E0101", place(0), "a `;`") };
+            human(&sources, &[diagnostic], false)
+        };
+        assert!(!shown(6).contains("more places") && shown(6).contains("6 ~ a\n"));
+        assert!(shown(9).contains("and in 5 more places") && !shown(9).contains("5 ~ a\n"), "{}", shown(9));
     }
 }
