@@ -15,6 +15,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Inputs of runs, counted.
+static INPUTS: AtomicU64 = AtomicU64::new(0);
 
 /// What a run said and how it ended.
 struct Run {
@@ -67,10 +71,12 @@ impl Folder {
     }
 
     fn run_with(&self, args: &[&str], input: &str) -> Run {
-        self.file(".input", input);
+        // Tests share folders.
+        let name = format!(".input {}", INPUTS.fetch_add(1, Ordering::Relaxed));
+        self.file(&name, input);
         let mut command = Command::new(env!("CARGO_BIN_EXE_gonogo"));
-        let input = fs::File::open(self.0.join(".input")).unwrap();
-        fs::remove_file(self.0.join(".input")).unwrap();
+        let input = fs::File::open(self.0.join(&name)).unwrap();
+        fs::remove_file(self.0.join(&name)).unwrap();
         let output = command.current_dir(&self.0).args(args).stdin(Stdio::from(input)).output().unwrap();
         Run {
             code: output.status.code().expect("no signal"),

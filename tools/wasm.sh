@@ -3,7 +3,7 @@
 #
 # With the wasm32-unknown-unknown library of the compiler in use (rustup target add) it is an ordinary build. Without, Debian's
 # rustc-web and rust-web-src do: an older compiler with the sources of its own standard library, which cargo then builds too.
-# That compiler is 1.85: what the runtime and `image` use of later versions exists in it behind feature gates.
+# Where that compiler is older than 1.88, what the runtime and `image` use of later versions exists in it behind feature gates.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -22,8 +22,12 @@ debian_source=/usr/lib/rustlib/src/rust/library
 
 if [ -d "$sysroot/lib/rustlib/$target" ]; then
     "${build[@]}"
-elif [ -x "$debian_rustc" ] && [ -d "$debian_source/std" ] && "$debian_rustc" --version | grep -q '1\.85'; then
-    gates='["-Zcrate-attr=feature(let_chains,unsigned_is_multiple_of,slice_as_chunks)"]'
+elif [ -x "$debian_rustc" ] && [ -d "$debian_source/std" ]; then
+    minor="$("$debian_rustc" --version | sed -n 's/^rustc 1\.\([0-9]*\)\..*/\1/p')"
+    gates='[]'
+    if [ "${minor:-0}" -lt 88 ]; then
+        gates='["-Zcrate-attr=feature(let_chains,unsigned_is_multiple_of,slice_as_chunks)"]'
+    fi
     export RUSTC="$debian_rustc" RUSTC_BOOTSTRAP=1
     RUSTFLAGS+=" -Clinker=$sysroot/lib/rustlib/$host/bin/rust-lld"
     "${build[@]}" --ignore-rust-version -Zbuild-std=std,panic_abort -Zbuild-std-features= -Zprofile-rustflags \

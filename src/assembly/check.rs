@@ -309,7 +309,11 @@ mod tests {
             "`alignment_pin[1].shank.side` can meet `locking_ring.pin_hole[1].side` within tolerance"
         );
         assert_eq!(found[0].help.as_deref(), Some("rz = 0 ±0.0063 deg"));
-        assert!(found[0].labels[0].text.contains("0.0040 mm of clearance is left"), "{}", found[0].labels[0].text);
+        assert!(
+            found[0].labels[0].text.contains("0.0020 mm of clearance is left to every side"),
+            "{}",
+            found[0].labels[0].text
+        );
     }
 
     #[test]

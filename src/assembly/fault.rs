@@ -316,7 +316,8 @@ mod tests {
         use FaultKind::{Misplaced, Missing, NotSeated};
         assert_eq!(kinds(&modes, 1), [Missing, NotSeated]);
         assert_eq!(kinds(&modes, 3), [Missing, NotSeated]);
-        assert_eq!(kinds(&modes, WHEEL_A2), [Missing, NotSeated, Misplaced]);
+        // On top, and guided by the pins over 2 mm only.
+        assert_eq!(kinds(&modes, WHEEL_A2), [Missing, NotSeated, Misplaced, NotSeated]);
         assert_eq!(kinds(&modes, 5), [Missing, NotSeated]);
         assert_eq!(kinds(&modes, 8), [Missing, NotSeated]);
         assert_eq!(kinds(&modes, 9), [Missing, NotSeated]);
@@ -360,9 +361,9 @@ mod tests {
         let mode = modes.iter().find(|m| m.component == 8 && m.kind == FaultKind::NotSeated).expect("hd_pin");
         let faulted = apply(mode, [0.5, 0.0, 0.0], &a.solids, &poses);
         let up = faulted.pose.expect("still there").translation.vector - poses[8].translation.vector;
-        assert!((up - Vector3::z() * 2.4).norm() < 1e-9);
-        assert!((faulted.size - 2.4).abs() < 1e-9);
-        assert_eq!(faulted.text, "raised 2.4 mm");
+        assert!((up - Vector3::z() * 1.375).norm() < 1e-9);
+        assert!((faulted.size - 1.375).abs() < 1e-9);
+        assert_eq!(faulted.text, "raised 1.4 mm");
     }
 
     #[test]

@@ -54,8 +54,8 @@ fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
 /// The log-likelihood ratio below which a node counts as faulty in one way. Where good and faulty renders lie apart but below
 /// zero, the middle between them decides. Else its sign does, less what the promised rate of false rejects takes: of good
 /// renders a share `p0` falls below zero, and from there on likelihood ratios fall off as their own size says (a ratio of Λ is
-/// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap and that of the goods reaches below zero, ratios are not
-/// what they say, and the spread of the goods may take more.
+/// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap, that of the goods reaches below zero or less than half of
+/// the faulty renders are found, ratios are not what they say, and the spread of the goods may take more.
 /// Ratios are natural logarithms, a ratio of 1 being that of `independent` coefficients' worth.
 /// Never a quantile of the goods: their few lowest scores say nothing about a photo's.
 pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independent: f64) -> f64 {
@@ -70,7 +70,8 @@ pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independ
     let middle = at_share(good, 0.5);
     let below_zero = below_zero(middle, middle - at_share(good, ONE_DEVIATION_DOWN));
     let by_ratio = -(below_zero / false_reject).ln().max(0.0) / independent;
-    if apart || lowest > 0.0 {
+    let found = fault.iter().filter(|f| **f < by_ratio).count();
+    if apart || (lowest > 0.0 && 2 * found >= fault.len()) {
         return by_ratio;
     }
     let mut distances: Vec<f64> = good.iter().map(|g| (g - middle).abs()).collect();
@@ -115,6 +116,17 @@ mod tests {
             threshold(&good, &[-0.8, -0.7, -0.6, -0.5], 1e-5, INDEPENDENT) < limit,
             "a stricter promise costs more"
         );
+    }
+
+    /// Good renders of a part that hardly shows scatter into what its faults look like: who finds one fault in five may not
+    /// reject as many good ones.
+    #[test]
+    fn what_finds_next_to_nothing_rejects_nothing() {
+        let good = [0.01, 0.02, 0.05, 0.08, 0.1, 0.12, 0.15, 0.18, 0.2];
+        let limit = |fault: &[f64]| threshold(&good, fault, 1e-3, INDEPENDENT);
+        let spread = 0.1 - 3.0902 * 0.05 / 0.6745;
+        assert!(limit(&[-0.3, 0.0, 0.05, 0.1, 0.1]) < spread + 1e-3);
+        assert!(limit(&[-0.3, -0.3, -0.3, 0.05, 0.1]) > spread + 0.05, "most are found");
     }
 
     /// Of a sweep the large half lies apart, the small half does not: it alone has the spread's threshold.

@@ -38,9 +38,10 @@ const ACCEPT_SHARE: f64 = 0.5;
 /// Share of the held-out calibrations' lowest correlation below which a photo is refused.
 const POOREST_FIT: f64 = 0.4;
 
-/// An error mode whose faulty renders score lower than good ones in fewer pairs than this is not told apart: two normal
-/// distributions one standard deviation apart.
-const LEAST_POWER: f64 = 0.76;
+/// An error mode is not told apart if, of its faulty renders, the half that shows most scores lower than good ones in fewer pairs
+/// than this: that of two normal distributions one standard deviation apart. Only half, because a sweep begins with sizes that
+/// nobody could tell.
+const LEAST_POWER: f64 = 0.93;
 
 /// A station as some customer might have it.
 #[derive(Clone)]
@@ -232,7 +233,10 @@ fn forget_blind(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorM
                 |m: &usize| design.components[modes[*m].component].name == node.name && modes[*m].kind.word() == kind;
             let scenes = judged.iter().flat_map(|j| j.faulty.iter().zip(&plan.scenes));
             let shown = scenes.filter(|(_, scene)| scene.iter().any(own));
-            order(&good, &shown.flat_map(|(verdicts, _)| verdicts).filter_map(of).collect::<Vec<_>>())
+            let mut faulty: Vec<f64> = shown.flat_map(|(verdicts, _)| verdicts).filter_map(of).collect();
+            faulty.sort_by(f64::total_cmp);
+            faulty.truncate(faulty.len().div_ceil(2));
+            order(&good, &faulty)
         };
         let powers: Vec<f64> =
             node.hypotheses.iter().enumerate().map(|(h, hyp)| if h == 0 { 1.0 } else { power(&hyp.fault) }).collect();
