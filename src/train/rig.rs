@@ -7,7 +7,7 @@
 use super::plan::{self, Plan};
 use super::stats::{rate, rounded};
 use super::synthesise::{Draws, Shots};
-use super::thresholds::{self, TRIM, at_share};
+use super::thresholds::{self, TRIM, at_share, most_shown};
 use super::verify::{self, Customer, HeldOut, Judged};
 use super::{CUSTOMERS, HELD_OUT_FAULTY, HELD_OUT_GOOD, Job, Observer, Step};
 use super::{advised, blind, fit_model, overlaps, render, shots};
@@ -209,7 +209,7 @@ fn modes(component: &str, models: &[Model], trials: &Trials) -> Vec<Mode> {
             let mut faulty: Vec<f64> = shown.iter().filter_map(least).collect();
             good.sort_by(f64::total_cmp);
             faulty.sort_by(f64::total_cmp);
-            discriminant(&good, &faulty).map(|[weight, offset, power]| Seen {
+            discriminant(&good, most_shown(&faulty)).map(|[weight, offset, power]| Seen {
                 camera: camera as u32,
                 weight,
                 offset,
@@ -258,7 +258,7 @@ fn set_thresholds(rig: &mut Rig, trials: &Trials) {
             let sum = |views: &Vec<&Verdict>| joint::sum(mode, &name, &cameras, views);
             let good = sorted(trials.goods().iter().filter_map(sum).collect());
             let faulty = sorted(trials.with(trials.scenes, &name, &mode.fault).iter().filter_map(sum).collect());
-            mode.threshold = rounded(thresholds::threshold(&good, &faulty, allowed, 1.0));
+            mode.threshold = rounded(thresholds::threshold(&good, most_shown(&faulty), allowed, 1.0));
         }
         let score = |views: &Vec<&Verdict>| rounded(joint::score(component, &cameras, views));
         let faulty = component.modes.iter().flat_map(|mode| trials.with(trials.scenes, &name, &mode.fault));

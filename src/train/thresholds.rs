@@ -87,6 +87,11 @@ fn below_zero(middle: f64, deviation: f64) -> f64 {
     if middle <= 0.0 { 0.5 } else { 0.5 * (-0.5 * (middle / deviation.max(f64::MIN_POSITIVE)).powi(2)).exp() }
 }
 
+/// Of the ascending scores of faulty renders the half that shows most: a sweep begins with sizes that nobody could tell.
+pub(super) fn most_shown(faulty: &[f64]) -> &[f64] {
+    &faulty[..faulty.len().div_ceil(2)]
+}
+
 /// The value below which a share of ascending values lies.
 pub(super) fn at_share(sorted: &[f64], share: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * share).round() as usize]

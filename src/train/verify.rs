@@ -235,8 +235,7 @@ fn forget_blind(model: &mut Model, design: &Design, plan: &Plan, modes: &[ErrorM
             let shown = scenes.filter(|(_, scene)| scene.iter().any(own));
             let mut faulty: Vec<f64> = shown.flat_map(|(verdicts, _)| verdicts).filter_map(of).collect();
             faulty.sort_by(f64::total_cmp);
-            faulty.truncate(faulty.len().div_ceil(2));
-            order(&good, &faulty)
+            order(&good, thresholds::most_shown(&faulty))
         };
         let powers: Vec<f64> =
             node.hypotheses.iter().enumerate().map(|(h, hyp)| if h == 0 { 1.0 } else { power(&hyp.fault) }).collect();
