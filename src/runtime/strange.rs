@@ -14,7 +14,7 @@ use super::math;
 use super::model::{Node, SCALES, Usual};
 use super::row::Row;
 
-/// Mean surprise in every square of each size: steps of its logarithm from [`FAINTEST`], counted from 1; 0 where a square holds
+/// Mean surprise in every square of each size: steps of its logarithm from ln 0.001, counted from 1; 0 where a square holds
 /// too few coefficients.
 pub type Unlikeness = [Row; SCALES];
 
