@@ -218,3 +218,28 @@ fn a_clip_on_loose_pegs_can_stand_on_them_or_be_the_wrong_way_round() {
     let askew = fault::apply(misplaced[2], [1.0, 0.0, 0.0], &solids, &poses);
     assert_eq!(askew.text, "turned 40.0 deg", "nothing keeps it from turning");
 }
+
+/// A screw on a washer of the library follows that washer: their faces stay together at every draw.
+#[test]
+fn what_rests_on_a_piece_follows_its_true_thickness() {
+    let spec = "gonogo 1\ntolerances ISO2768-m\nuse \"std/iso4762\"\nuse \"std/iso7089\"\nmaterial steel {\n    metal = steel\n}\npart plate {\n    material = steel\n    let t = 16\n    add slab = box(x = 80, y = 50, z = t)\n    cut bore = 2x cylinder(d = 5 basic, h = through) on line(pitch = 40)\n}\npart washer = iso7089(d = M5)\npart screw = iso4762(d = M5, l = 16)\nassembly stack {\n    root plate\n    place screw = 2x screw on plate.bore {\n        z = (plate.t + washer.h)\n    }\n    place washer = 2x washer on plate.bore {\n        z = plate.t\n    }\n}\nstation bench {\n    light room = room()\n}\n";
+    let loaded = load("spec.gng", &|_| Ok(spec.to_string()), &[]);
+    assert!(loaded.diagnostics.is_empty(), "{:?}", loaded.diagnostics);
+    let design = loaded.design.unwrap();
+    let at = |name: &str| design.components.iter().find(|c| c.name == name).unwrap();
+    let row = |name: &str| design.dims.iter().position(|d| d.name == name).unwrap_or_else(|| panic!("no {name}"));
+    let (t, first, second) = (row("plate.t"), row("washer[1].h"), row("washer[2].h"));
+    let mut values = design.nominal();
+    (values[t], values[first], values[second]) = (16.1, 0.93, 1.07);
+    for (screw, h) in [("screw[1]", 0.93), ("screw[2]", 1.07)] {
+        let z = at(screw).pose.t[2].eval(&values);
+        assert!((z - (16.1 + h)).abs() < 1e-12, "{screw}: {z}");
+    }
+    assert!(design.dims.iter().all(|d| !d.name.starts_with("screw[1].z")), "its place has limits of its own");
+    let solid = |c: &gonogo::design::model::Component| {
+        Arc::new(evaluate(&design.parts[c.part], &design.nominal(), &Quality::default()).unwrap())
+    };
+    let solids: Vec<Arc<Solid>> = design.components.iter().map(solid).collect();
+    let (_, found) = analyse(&design, &solids);
+    assert!(found.iter().all(|d| !d.message.contains("can enter")), "{found:?}");
+}

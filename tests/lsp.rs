@@ -143,6 +143,33 @@ fn families_and_their_members_are_known() {
 }
 
 #[test]
+fn dimensions_of_other_pieces_are_known() {
+    let mut editor = Editor::new();
+    let spec = "gonogo 1\nuse \"std/iso7089\"\nmaterial m {\n    kind = matt\n}\npart plate {\n    material = m\n    let depth = 10 ±0.2\n    add body = box(x = 30, y = 30, z = depth)\n}\npart washer = iso7089(d = M5)\nassembly t {\n    root plate\n    place washer on plate {\n        z = plate.depth\n    }\n    place lid = plate on washer {\n        z = (washer.h + 0)\n    }\n}\nstation s {\n    light r = room()\n}\n";
+    editor.open("/w/a.gng", spec);
+    let shown = editor.shown("/w/a.gng");
+    assert!(shown.iter().all(|d| d["severity"] != 1), "{shown:#?}");
+    assert_eq!(editor.definition_line("/w/a.gng", "depth\n    }"), "let depth = 10 ±0.2");
+    assert_eq!(editor.definition_line("/w/a.gng", "plate.depth"), "root plate");
+    let hover = editor.hover("/w/a.gng", "plate.depth");
+    assert!(hover.contains("9.800 … 10.200 mm"), "{hover}");
+    let renamed = editor.rename("/w/a.gng", "depth\n    }", "thick").unwrap();
+    let text = &renamed["/w/a.gng"];
+    assert!(text.contains("let thick = 10 ±0.2") && text.contains("z = plate.thick\n"), "{text}");
+    for (typed, line) in [("plate.", "        z = plate."), ("(washer.", "        z = (washer.")] {
+        let text = spec.replacen("        z = plate.depth", line, 1);
+        editor.open("/w/a.gng", &text);
+        let found = editor.complete("/w/a.gng", text.find(line).unwrap() + line.len());
+        let wanted = if typed == "plate." { "depth" } else { "h" };
+        assert!(found.contains(&wanted.to_string()) && !found.contains(&"lid".to_string()), "{typed}: {found:?}");
+    }
+    let text = spec.replacen("z = plate.depth", "z = ", 1);
+    editor.open("/w/a.gng", &text);
+    let found = editor.complete("/w/a.gng", text.find("z = \n").unwrap() + 4);
+    assert!(found.contains(&"plate".to_string()), "{found:?}");
+}
+
+#[test]
 fn fixes_are_code_actions() {
     let mut editor = Editor::new();
     let spec = "gonogo 1\nlet ab = 6 // ±🔩\nlet c = ab + 2\n";

@@ -19,6 +19,8 @@ use std::sync::Arc;
 const FLUSH: f64 = 1e-3;
 /// Shortfalls that differ by less than this (mm) are equal: the first is told.
 const SAME: f64 = 1e-9;
+/// A zone or limit that is cut to less than this share of itself cannot be held for the price.
+const HOLDABLE: f64 = 0.1;
 /// Contributors named in a note.
 const NAMED: usize = 4;
 
@@ -138,10 +140,23 @@ impl Case<'_> {
             None => warning,
         };
         match self.cure(design) {
-            Some((help, Some((span, text)))) => warning.suggest(help, span, text),
-            Some((help, None)) => warning.help(help),
+            // What nobody can hold is no cure: the hole is made wider instead.
+            Some(Cure { kept, paste: Some(_), .. }) if kept < HOLDABLE && self.is_fit() => {
+                let hole = face_name(design, solids, hollow(self.contact));
+                warning.help(format!("`{hole}` wider by {} mm", rounded_up(2.0 * self.missing)))
+            }
+            Some(Cure { help, paste: Some((span, text)), .. }) => warning.suggest(help, span, text),
+            Some(Cure { help, .. }) if flat => {
+                warning.help(format!("{help}; or give that length a name with `let`, and place by it"))
+            }
+            Some(Cure { help, .. }) => warning.help(help),
             None => warning,
         }
+    }
+
+    /// Whether a hole is too narrow, which a wider one would mend.
+    fn is_fit(&self) -> bool {
+        self.contact.fit.is_some()
     }
 
     /// What clearance there is, and what placement takes of it.
@@ -154,7 +169,7 @@ impl Case<'_> {
             format!("at MMC they interfere by {:.4} mm, and placement allows ±{reach:.4} mm", -left)
         } else {
             // Of faces with diameters the gap is their difference.
-            let left = if self.contact.fit.is_some() { left / 2.0 } else { left };
+            let left = if self.is_fit() { left / 2.0 } else { left };
             format!("at MMC {left:.4} mm of clearance is left to every side, but placement allows ±{reach:.4} mm")
         }
     }
@@ -167,7 +182,7 @@ impl Case<'_> {
     }
 
     /// The limit that alone leaves no interference: of a placement if one will do, with its text, else of a size.
-    fn cure(&self, design: &Design) -> Option<(String, Option<(Span, String)>)> {
+    fn cure(&self, design: &Design) -> Option<Cure> {
         let placed = |s: &&Share| self.axes.contains_key(&s.dim);
         let zone = self.shares.iter().filter(placed).find(|s| s.loss > self.missing + SAME);
         let size = || self.shares.iter().filter(|s| !placed(s)).find(|s| s.loss > self.missing - SAME);
@@ -184,16 +199,25 @@ impl Case<'_> {
         let nominal = (dim.range.nominal * scale * 1e6).round() / 1e6 + 0.0;
         if let Some(axis) = axis {
             let room = rounded_down(room.abs());
-            let help = format!("{} = {nominal} ±{room}{unit}", AXES[axis]);
             // In whatever units the file is written.
             let unit = if turns { "deg" } else { "mm" };
-            return Some((help, Some((dim.span, format!("{nominal} {unit} ±{room} {unit}")))));
+            let text = format!("{nominal} {unit} ±{room} {unit}");
+            return Some(Cure { help: format!("{} = {text}", AXES[axis]), paste: Some((dim.span, text)), kept });
         }
         let limit = nominal + rounded_down(room.abs()).parse::<f64>().unwrap_or(0.0) * room.signum();
         let limit = (limit * 1e6).round() / 1e6;
         let word = if share.at > dim.range.nominal { "at most" } else { "at least" };
-        Some((format!("`{}` {word} {limit}{unit}", dim.name), None))
+        Some(Cure { help: format!("`{}` {word} {limit}{unit}", dim.name), paste: None, kept })
     }
+}
+
+/// A limit that leaves no interference.
+struct Cure {
+    help: String,
+    /// Where it is written, and what to write there.
+    paste: Option<(Span, String)>,
+    /// The share of the deviation that it leaves.
+    kept: f64,
 }
 
 impl Case<'_> {
@@ -215,6 +239,13 @@ fn rounded_down(value: f64) -> String {
     let decimals = (1.0 - value.max(f64::MIN_POSITIVE).log10().floor()).clamp(0.0, MOST_DECIMALS) as usize;
     let scale = 10f64.powi(decimals as i32);
     format!("{:.decimals$}", (value * scale + 1e-9).floor() / scale)
+}
+
+/// A positive number raised to two significant digits.
+fn rounded_up(value: f64) -> String {
+    let decimals = (1.0 - value.max(f64::MIN_POSITIVE).log10().floor()).clamp(0.0, MOST_DECIMALS) as usize;
+    let scale = 10f64.powi(decimals as i32);
+    format!("{:.decimals$}", (value * scale - 1e-9).ceil() / scale)
 }
 
 /// The axes of a placement as the spec calls them.

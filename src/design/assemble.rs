@@ -3,6 +3,7 @@
 //! In: `root` and `place` statements. Out: components, parents before their children, each with its part, the frame it
 //! is placed in and its pose with its tolerance zone.
 
+use super::borrowed::{Asking, asked};
 use super::family::Family;
 use super::fields::Fields;
 use super::model::{Component, Expr, Part, PoseExpr};
@@ -61,8 +62,7 @@ impl Resolver {
         let mut waiting = places;
         // Placements may be written in any order: each round builds those whose support stands.
         while !waiting.is_empty() {
-            let (ready, rest): (Vec<_>, Vec<_>) =
-                waiting.into_iter().partition(|place| built.groups.contains_key(&place.on.segments[0].name.text));
+            let (ready, rest): (Vec<_>, Vec<_>) = waiting.into_iter().partition(|place| self.ready(place, &built));
             if ready.is_empty() {
                 self.unsupported(&rest, &built);
                 break;
@@ -101,6 +101,8 @@ impl Resolver {
         let identity = Seat { component: usize::MAX, frame: PoseExpr::identity() };
         if let Some(part) = self.piece(wanted, &name.text, catalogue, counts, built) {
             let pose = (PoseExpr::identity(), [false; 6]);
+            let names = std::mem::take(&mut self.locals);
+            self.standing.add(&name.text, names, None);
             built.groups.insert(name.text.clone(), vec![0]);
             built.components.push(component(name.text.clone(), part, identity, pose, name.span));
         }
@@ -139,17 +141,32 @@ impl Resolver {
             return self.report(Diagnostic::error("E0212", place.name.span, message).label("too many components"));
         }
         let wanted = place.part.as_ref().unwrap_or(&place.name);
-        for (i, seat) in seats.into_iter().enumerate() {
-            let name =
-                if place.count.is_some() { format!("{}[{}]", place.name.text, i + 1) } else { place.name.text.clone() };
+        let copies = seats.len();
+        for (copy, seat) in seats.into_iter().enumerate() {
+            let name = if place.count.is_some() {
+                format!("{}[{}]", place.name.text, copy + 1)
+            } else {
+                place.name.text.clone()
+            };
             let Some(part) = self.piece(wanted, &name, catalogue, counts, built) else { return };
+            let names = std::mem::take(&mut self.locals);
+            self.standing.ask(Some(Asking { below: seat.component, copy, copies }));
             let pose = self.pose(place, &name);
+            self.standing.ask(None);
+            self.standing.add(&place.name.text, names, Some(seat.component));
             built.groups.entry(place.name.text.clone()).or_default().push(built.components.len());
             built.components.push(component(name, part, seat, pose, place.name.span));
         }
     }
 
-    /// A part for one component; dimensions carry the component's name when the part is placed more than once.
+    /// Whether all that a placement needs has been placed. What is written nowhere is reported when it is looked for.
+    fn ready(&self, place: &ast::Place, built: &Assembled) -> bool {
+        let stands = |path: &ast::Path| built.groups.contains_key(&path.segments[0].name.text);
+        let lends = |path: &ast::Path| stands(path) || !self.written.contains(&path.segments[0].name.text);
+        stands(&place.on) && asked(place).into_iter().all(lends)
+    }
+
+    /// A part for one component, whose names stay in `locals`; dimensions carry the component's name when the part is placed more than once.
     fn piece(
         &mut self,
         wanted: &ast::Name,
@@ -231,7 +248,30 @@ impl Resolver {
                 None => diagnostic.help(format!("components so far: {}", known.collect::<Vec<_>>().join(", "))),
             });
         }
+        let reported = self.diagnostics.len();
         self.placement_cycle(waiting);
+        if self.diagnostics.len() == reported {
+            self.waits_for_its_own(waiting, built);
+        }
+    }
+
+    /// Reports the first placement whose support stands, but whose place needs a dimension of what waits for it in turn.
+    fn waits_for_its_own(&mut self, waiting: &[&ast::Place], built: &Assembled) {
+        let stands = |name: &str| built.groups.contains_key(name);
+        for place in waiting.iter().filter(|place| stands(&place.on.segments[0].name.text)) {
+            let lenders = asked(place).into_iter();
+            let missing = lenders
+                .map(|path| (path, &path.segments[0].name.text))
+                .find(|(_, name)| waiting.iter().any(|other| other.name.text == **name && !stands(name)));
+            let Some((path, lender)) = missing else { continue };
+            let message = format!(
+                "the place of `{}` needs a dimension of `{lender}`, which is not placed before it",
+                place.name.text
+            );
+            let fault = Diagnostic::error("E0504", path.span, message).label("each waits for the other");
+            let help = "define the dimension above all parts with `let`, and use that name in both places";
+            return self.report(fault.help(help));
+        }
     }
 
     /// Follows supports from each waiting placement until one repeats; reports the first circle.

@@ -5,6 +5,7 @@
 
 mod assemble;
 mod beside;
+mod borrowed;
 mod dimension;
 mod elsewhere;
 pub mod essence;

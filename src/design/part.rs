@@ -25,7 +25,7 @@ pub struct PartSource<'a> {
 }
 
 impl Resolver {
-    /// One piece of a part. Its dimensions are named under `path`: the part's name, or the component's when the part
+    /// One piece of a part; its names stay behind in `locals`. Its dimensions are named under `path`: the part's name, or the component's when the part
     /// is placed more than once, so that every piece has draws of its own.
     pub fn part(&mut self, source: PartSource, path: &str, materials: &BTreeMap<&str, usize>) -> Part {
         let Some(names) = self.part_names(source, path) else {
@@ -37,11 +37,9 @@ impl Resolver {
         self.draw_outlines(source.body, path);
         let features = if bounded { self.features(source.body, &Context::part(path)) } else { Vec::new() };
         self.check_features(&format!("part `{}`", source.name.text), source.name.span, source.body);
-        self.warn_unused_locals();
+        self.note_idle_names();
         self.warn_unused_outlines();
         self.read_unread_names(true);
-        // They end with the part: a placement or a station that asks for one asks for what nobody can see.
-        self.locals = BTreeMap::new();
         let material = self.part_material(source, materials);
         Part { name: source.name.text.clone(), material, features, span: source.name.span }
     }
@@ -102,15 +100,19 @@ impl Resolver {
         );
     }
 
-    fn warn_unused_locals(&mut self) {
-        let unused: Vec<(String, Span)> = self
-            .locals
-            .iter()
-            .filter(|(_, named)| !self.is_used(named.span))
-            .map(|(n, d)| (n.clone(), d.span))
-            .collect();
-        for (name, span) in unused {
-            self.unused("dimension", &name, span);
+    fn note_idle_names(&mut self) {
+        let idle = self.locals.iter().filter(|(_, named)| !self.is_used(named.span));
+        let idle: Vec<_> = idle.map(|(name, d)| ((d.span.file, d.span.start, d.span.end), name.clone())).collect();
+        self.idle.extend(idle);
+    }
+
+    /// Warns of names of parts that nobody used, in their part or in a placement.
+    pub fn warn_idle_names(&mut self) {
+        for ((file, start, end), name) in std::mem::take(&mut self.idle) {
+            let span = Span { file, start, end };
+            if !self.is_used(span) {
+                self.unused("dimension", &name, span);
+            }
         }
     }
 

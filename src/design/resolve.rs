@@ -261,6 +261,7 @@ impl Resolver {
         let mut parts = Vec::new();
         for (source, _) in idle {
             parts.push(scratch.part(*source, &source.name.text, &catalogue.materials));
+            scratch.locals.clear();
             if blocks.assembly.is_some() {
                 let message = format!("part `{}` is never placed", source.name.text);
                 scratch.report(
@@ -274,10 +275,11 @@ impl Resolver {
         scratch.settle_readings();
         self.readings = scratch.readings;
         self.diagnostics = scratch.diagnostics;
-        (self.used, self.used_materials) = (scratch.used, scratch.used_materials);
+        (self.used, self.used_materials, self.idle) = (scratch.used, scratch.used_materials, scratch.idle);
     }
 
     fn warn_unused(&mut self, blocks: &Blocks) {
+        self.warn_idle_names();
         for (name, _, _) in blocks.lets.iter().filter(|(_, _, used)| !used) {
             if !self.is_used(name.span) {
                 self.unused("dimension", &name.text, name.span);

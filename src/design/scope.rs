@@ -2,6 +2,7 @@
 //!
 //! In: syntax trees. Out: a [`Resolver`] that the other files of this stage extend with their own kind of statement.
 
+use super::borrowed::Standing;
 use super::model::{DimId, Dimension, Expr, Sense};
 use super::outline::Drawn;
 use super::survey::Readings;
@@ -100,6 +101,10 @@ pub struct Resolver {
     pub used_materials: BTreeSet<usize>,
     /// Where units are written: what has the wrong one is shown with another.
     pub units: BTreeSet<Span2>,
+    /// The components that stand so far, whose pieces a placement may ask for their dimensions.
+    pub standing: Standing,
+    /// The names of parts that nothing in their part uses: another piece's placement may.
+    pub idle: BTreeMap<Span2, String>,
     /// Components that are written, and features that could not be made: neither is unknown.
     pub written: BTreeSet<String>,
     pub failed: BTreeSet<String>,
@@ -160,14 +165,7 @@ impl Resolver {
 
     /// The value a path stands for.
     pub fn lookup(&mut self, path: &ast::Path, usage: Use) -> Option<Typed> {
-        let Some(name) = path.word() else {
-            self.report(
-                Diagnostic::error("E0203", path.span, "expected a named dimension, this is a path")
-                    .label("not a dimension")
-                    .help("name the dimension with `let` and use that name in both places"),
-            );
-            return None;
-        };
+        let Some(name) = path.word() else { return self.borrowed(path, usage) };
         let local = self.locals.contains_key(name);
         let table = if local { &self.locals } else { &self.globals };
         let Some(named) = table.get(name) else {

@@ -105,6 +105,11 @@ impl Proposals<'_> {
             ("assembly", ["measure", _, "=", rest @ ..]) => self.measure(rest),
             ("inspect", ["watch" | "ignore", ..]) => self.names(Kind::Component, None),
             ("outline", [_, ..]) => self.side(words),
+            ("place", [key, "=", value @ ..]) if !self.borrowed(value) => {
+                self.value(here.owner(), key, value);
+                self.lenders(value);
+            }
+            ("place", [_, "=", ..]) => {}
             (_, [key, "=", value @ ..]) => self.value(here.owner(), key, value),
             (block, []) => self.statements(block, here),
             _ => {}
@@ -123,6 +128,12 @@ impl Proposals<'_> {
                 self.value_of(takes, value, op);
             }
             (None, words) if here.statement.first() == Some(&"part") => self.member(here, words),
+            (None, words) if here.block() == "place" => {
+                if !self.borrowed(words) {
+                    self.dimension(words, Takes::Length, "");
+                    self.lenders(words);
+                }
+            }
             // Coordinates, or arithmetic.
             _ => self.dimension(words, Takes::Length, ""),
         }
@@ -233,6 +244,27 @@ impl Proposals<'_> {
                 self.units(units_of(takes));
             }
         }
+    }
+
+    /// The components whose parts a placement may ask for a dimension, where a name may begin.
+    fn lenders(&mut self, value: &[&str]) {
+        if value.last().is_none_or(|last| ["(", "+", "-", "*", "/", "="].contains(last)) {
+            self.names(Kind::Component, None);
+        }
+    }
+
+    /// `washer.` in a placement: the dimensions of that component's part. Says whether it is that.
+    fn borrowed(&mut self, value: &[&str]) -> bool {
+        let Some(dot) = value.iter().rposition(|w| *w == ".").filter(|dot| *dot + 1 == value.len()) else {
+            return false;
+        };
+        // An index stands between them: `washer[2].`
+        let name = value[..dot].iter().rev().find(|w| w.starts_with(|c: char| c.is_ascii_alphabetic()));
+        let component = name.and_then(|name| self.index.find(Kind::Component, None, name));
+        if let Some(part) = component.and_then(|id| self.index.part_of(id)) {
+            self.names(Kind::Dimension, Some(part));
+        }
+        true
     }
 
     /// Classes for holes under a cut, for shafts elsewhere; both where nothing is known.

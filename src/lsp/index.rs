@@ -288,10 +288,19 @@ impl Index {
     }
 
     fn named(&mut self, path: &Path, part: Option<SymbolId>) {
-        let Some(word) = path.word() else { return };
+        let Some(word) = path.word() else { return self.borrowed(path) };
         let local = part.and_then(|_| self.find(Kind::Dimension, part, word));
         if let Some(symbol) = local.or_else(|| self.find(Kind::Dimension, None, word)) {
             self.mentions.push(Mention { span: path.segments[0].name.span, symbol, role: Mentioned::Use });
+        }
+    }
+
+    /// `washer[2].h`: a component, and a dimension of its part.
+    fn borrowed(&mut self, path: &Path) {
+        let [component, Segment { name, index: None }] = path.segments.as_slice() else { return };
+        let component = self.mention(Kind::Component, None, &component.name);
+        if let Some(part) = component.and_then(|id| self.part_of(id)) {
+            self.mention(Kind::Dimension, Some(part), name);
         }
     }
 
