@@ -79,6 +79,16 @@ pub struct ErrorMode {
 }
 
 impl ErrorMode {
+    /// What is said of the component in this mode: the kind, or how it lies where the kind leaves that open.
+    pub fn said(&self) -> &'static str {
+        match self.motion {
+            Motion::Tilt(_) => "up at one side",
+            Motion::Shift(_) => "beside its place",
+            Motion::Flip(_) => "upside down",
+            _ => self.kind.word(),
+        }
+    }
+
     /// Whether it comes in more than one size.
     pub fn has_size(&self) -> bool {
         matches!(self.motion, Motion::Slide { .. } | Motion::Turn(_) | Motion::Shift(_) | Motion::Tilt(_))

@@ -73,7 +73,8 @@ impl Accel {
         let (boxes, owners) = tight_boxes(&flat);
         // The builder reports its time through this; nobody reads it.
         let mut time = Duration::default();
-        let bvh = build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut time);
+        // A scene is built once for millions of rays.
+        let bvh = build_bvh2(&boxes, BvhBuildParams::slow_build(), &mut time);
         let original: Vec<u32> = bvh.primitive_indices.iter().map(|&i| sound[owners[i as usize] as usize]).collect();
         let corners = original.iter().map(|&i| triangles[i as usize]).collect();
         Accel { bvh, corners, original }

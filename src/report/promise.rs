@@ -6,7 +6,7 @@
 use super::html::{at, class, count, escaped, of, percent};
 use super::strip::{Mark, strip};
 use super::{Report, Trained};
-use crate::runtime::model::{ModeRate, Node, Rate};
+use crate::runtime::model::{Hypothesis, ModeRate, Node, Rate};
 use crate::train::{WEAK, stats::lower_95};
 
 pub fn section(trained: &Trained, report: &Report) -> String {
@@ -63,10 +63,10 @@ fn group(name: &str, trained: &Trained, report: &Report) -> String {
     format!("<tbody{mark}>{rows}</tbody>\n")
 }
 
-/// The sizes a fault is looked for in.
+/// The sizes a fault is looked for in; a part that is up at one side is so by any of them.
 fn sweep(node: &Node, fault: &str) -> String {
-    let mut sweeps: Vec<String> =
-        node.hypotheses.iter().filter(|h| h.fault == fault && !h.sweep.is_empty()).map(|h| escaped(&h.sweep)).collect();
+    let of_fault = |h: &&Hypothesis| h.fault == fault && h.sweep.ends_with("mm");
+    let mut sweeps: Vec<String> = node.hypotheses.iter().filter(of_fault).map(|h| escaped(&h.sweep)).collect();
     sweeps.dedup();
     sweeps.join("<br>")
 }
@@ -122,7 +122,7 @@ fn blind(trained: &Trained, report: &Report) -> String {
     let unseen: Vec<String> = assembly
         .modes
         .iter()
-        .map(|m| (assembly.design.components[m.component].name.as_str(), m.kind.word()))
+        .map(|m| (assembly.design.components[m.component].name.as_str(), m.said()))
         .filter(|(component, fault)| !promised(component, fault))
         .map(|(component, fault)| format!("<li>{}: {}</li>", escaped(component), escaped(fault)))
         .collect();

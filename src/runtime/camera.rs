@@ -8,6 +8,13 @@ use serde::{Deserialize, Serialize};
 /// A point or vector in mm.
 pub type Vec3 = [f64; 3];
 
+/// Distortion is undone in at most this many rounds, ...
+const ROUNDS: usize = 30;
+/// ... fewer where one moves less than this (share of the radius), ...
+const NOTHING: f64 = 1e-15;
+/// ... and never beyond these factors, which no camera of a spec reaches.
+const STRETCH: [f64; 2] = [0.2, 5.0];
+
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
@@ -60,16 +67,28 @@ impl Camera {
     pub fn ray(&self, pixel: [f64; 2]) -> Vec3 {
         let half = self.centre[0];
         let seen = [pixel[0] - half, pixel[1] - self.centre[1]];
-        let mut undistorted = seen;
-        // Fixed point of r (1 + k1 r² + k2 r⁴) = seen: contracts by a factor of about 2 k1 r² + 4 k2 r⁴ per round.
-        for _ in 0..if self.k2 == 0.0 { 20 } else { 60 } {
-            let r2 = (undistorted[0].powi(2) + undistorted[1].powi(2)) / (half * half);
-            let stretch = if self.k2 == 0.0 { 1.0 + self.k1 * r2 } else { 1.0 + (self.k1 + self.k2 * r2) * r2 };
-            undistorted = [seen[0] / stretch, seen[1] / stretch];
-        }
-        let [u, v] = [undistorted[0] / self.focal, undistorted[1] / self.focal];
+        let stretch = self.stretch((seen[0].powi(2) + seen[1].powi(2)) / (half * half));
+        let [u, v] = seen.map(|s| s / stretch / self.focal);
         let [right, down, forward] = self.axes;
         normalise([0, 1, 2].map(|i| right[i] * u + down[i] * v + forward[i]))
+    }
+
+    /// By what distortion has moved a place outwards that is seen at a squared radius of `seen` half widths: the root near 1
+    /// of `s = 1 + k1 r² + k2 r⁴`, `r² = seen / s²`, by Newton's method.
+    fn stretch(&self, seen: f64) -> f64 {
+        let mut s = 1.0;
+        for _ in 0..ROUNDS {
+            let r2 = seen / (s * s);
+            let bent = (self.k1 + self.k2 * r2) * r2;
+            let steep = 1.0 + 2.0 * (self.k1 + 2.0 * self.k2 * r2) * r2 / s;
+            let step = (1.0 + bent - s) / steep;
+            // Where the lens folds the picture over there is no such place.
+            if step.is_nan() || step.abs() <= NOTHING {
+                break;
+            }
+            s = (s + step).clamp(STRETCH[0], STRETCH[1]);
+        }
+        s
     }
 
     /// Where the ray through a pixel meets the plane z = `z`; `None` if it never does.
@@ -134,7 +153,8 @@ mod tests {
     #[test]
     fn the_second_term_bends_and_is_undone() {
         let plain = Camera::look_at([0.0, -155.0, 303.0], [0.0, 0.0, 12.0], 2162.0, [640, 480]);
-        for (k1, k2) in [(0.0, 0.04), (-0.05, 0.02), (0.03, -0.05)] {
+        for (k1, k2) in [(0.0, 0.04), (-0.05, 0.02), (0.03, -0.05), (0.25, 0.0), (-0.15, 0.0), (0.2, 0.2), (-0.2, 0.12)]
+        {
             let camera = Camera { k1, k2, ..plain };
             let p = [-48.0, 33.0, 4.0];
             let (bent, straight) = (camera.project(p).unwrap(), plain.project(p).unwrap());

@@ -137,7 +137,7 @@ fn blind(job: &Job, unseen: &[usize]) -> Vec<Doubt> {
         let mode = &job.modes[m];
         let component = &job.design.components[mode.component];
         let message =
-            format!("station `{}` cannot tell when `{}` is {}", job.station.name, component.name, mode.kind.word());
+            format!("station `{}` cannot tell when `{}` is {}", job.station.name, component.name, mode.said());
         Diagnostic::warning("W0602", component.span, message).label("nothing in the image changes")
     };
     unseen.iter().map(|m| (*m, "a go says nothing about this fault", blind(m))).collect()
@@ -148,7 +148,7 @@ fn overlaps(job: &Job, promise: &Promise) -> Vec<Doubt> {
     let weak = promise.modes.iter().filter(|m| f64::from(m.escape.events) > WEAK * f64::from(m.escape.trials));
     let doubt = |rate: &ModeRate| {
         let of =
-            |m: &ErrorMode| job.design.components[m.component].name == rate.component && m.kind.word() == rate.fault;
+            |m: &ErrorMode| job.design.components[m.component].name == rate.component && m.said() == rate.fault;
         let mode = job.modes.iter().position(of)?;
         let (escaped, trials) = (rate.escape.events, rate.escape.trials);
         let message =

@@ -290,7 +290,7 @@ fn promise(rig: &Rig, trials: &Trials) -> Promise {
             escapes += escaped;
             all += count;
             let escape = rate(escaped, count);
-            rates.push(ModeRate { component: component.clone(), fault: trials.modes[m].kind.word().into(), escape });
+            rates.push(ModeRate { component: component.clone(), fault: trials.modes[m].said().into(), escape });
         }
     }
     Promise {

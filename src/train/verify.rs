@@ -340,7 +340,7 @@ pub(super) fn promise(
             escapes += escaped;
             trials += verdicts.len() as u32;
             let escape = rate(escaped, verdicts.len() as u32);
-            rates.push(ModeRate { component: component.clone(), fault: modes[m].kind.word().into(), escape });
+            rates.push(ModeRate { component: component.clone(), fault: modes[m].said().into(), escape });
         }
     }
     Promise {
