@@ -7,6 +7,8 @@
 
 #[path = "kernel_properties/build.rs"]
 mod build;
+#[path = "kernel_properties/flats.rs"]
+mod flats;
 
 use build::*;
 use gonogo::design::load;

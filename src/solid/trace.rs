@@ -59,15 +59,24 @@ pub(super) fn trace(
     let walk = Walk { surfaces, nodes: &search.nodes, room: &room };
     let mut curves: Vec<Traced> = Vec::new();
     for seed in &search.seeds {
-        // Near a node the nearest chord may be another branch's.
-        let passes = |c: &Traced| c.passages(seed).iter().any(|t| (c.at(*t) - seed).norm() < tolerance::WELD);
-        if curves.iter().any(passes) {
+        if known(&curves, seed) {
             continue;
         }
-        curves.extend(walk.from(seed)?);
+        let Some(curve) = walk.from(seed)? else { continue };
+        // A seed outside the room may lie on a known curve behind the end of it.
+        let inner = &curve.points[1..curve.points.len() - 1];
+        let twice = !walk.holds(seed) && inner.iter().any(|p| walk.holds(p) && known(&curves, p));
+        if !twice {
+            curves.push(curve);
+        }
     }
     let loci = curves.into_iter().map(|c| Locus::Traced(Arc::new(c))).collect();
     Ok(Shared { loci, nodes: search.nodes })
+}
+
+/// Whether a curve passes a point. Near a node the nearest chord may be another branch's.
+fn known(curves: &[Traced], p: &Point3<f64>) -> bool {
+    curves.iter().any(|c| c.passages(p).iter().any(|t| (c.at(*t) - p).norm() < tolerance::WELD))
 }
 
 fn beyond(bounds: &Bounds) -> f64 {
@@ -287,7 +296,7 @@ impl Walk<'_> {
                         return Ok((places, End::Closed));
                     }
                     places.push(next);
-                    if !self.room.iter().any(|b| b.holds(&next.0)) {
+                    if !self.holds(&next.0) {
                         return Ok((places, End::Out));
                     }
                     if stray < STRAIGHT.0 {
@@ -299,6 +308,10 @@ impl Walk<'_> {
             }
         }
         Err(Tangled)
+    }
+
+    fn holds(&self, p: &Point3<f64>) -> bool {
+        self.room.iter().any(|b| b.holds(p))
     }
 
     /// One step, with the distance of its middle from the cubic; `None` when it is too long.

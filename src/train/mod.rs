@@ -147,8 +147,7 @@ fn blind(job: &Job, unseen: &[usize]) -> Vec<Doubt> {
 fn overlaps(job: &Job, promise: &Promise) -> Vec<Doubt> {
     let weak = promise.modes.iter().filter(|m| f64::from(m.escape.events) > WEAK * f64::from(m.escape.trials));
     let doubt = |rate: &ModeRate| {
-        let of =
-            |m: &ErrorMode| job.design.components[m.component].name == rate.component && m.said() == rate.fault;
+        let of = |m: &ErrorMode| job.design.components[m.component].name == rate.component && m.said() == rate.fault;
         let mode = job.modes.iter().position(of)?;
         let (escaped, trials) = (rate.escape.events, rate.escape.trials);
         let message =
