@@ -222,7 +222,7 @@ fn a_clip_on_loose_pegs_can_stand_on_them_or_be_the_wrong_way_round() {
 /// A screw on a washer of the library follows that washer: their faces stay together at every draw.
 #[test]
 fn what_rests_on_a_piece_follows_its_true_thickness() {
-    let spec = "gonogo 1\ntolerances ISO2768-m\nuse \"std/iso4762\"\nuse \"std/iso7089\"\nmaterial steel {\n    metal = steel\n}\npart plate {\n    material = steel\n    let t = 16\n    add slab = box(x = 80, y = 50, z = t)\n    cut bore = 2x cylinder(d = 5 basic, h = through) on line(pitch = 40)\n}\npart washer = iso7089(d = M5)\npart screw = iso4762(d = M5, l = 16)\nassembly stack {\n    root plate\n    place screw = 2x screw on plate.bore {\n        z = (plate.t + washer.h)\n    }\n    place washer = 2x washer on plate.bore {\n        z = plate.t\n    }\n}\nstation bench {\n    light room = room()\n}\n";
+    let spec = "gonogo 1\ntolerances ISO2768-m\nuse \"std/iso4762\"\nuse \"std/iso7089\"\nmaterial steel {\n    metal = steel\n}\npart plate {\n    material = steel\n    let t = 16\n    add slab = box(x = 80, y = 50, z = t)\n    cut bore = 2x cylinder(d = 5 basic, h = through) on line(pitch = 40)\n}\npart washer = iso7089(d = M5)\npart screw = iso4762(d = M5, l = 16)\nassembly stack {\n    root plate\n    place screw = 2x screw on plate.bore {\n        z = (plate.t + washer.h + 0 * screw.k)\n    }\n    place washer = 2x washer on plate.bore {\n        z = plate.t\n    }\n}\nstation bench {\n    light room = room()\n}\n";
     let loaded = load("spec.gng", &|_| Ok(spec.to_string()), &[]);
     assert!(loaded.diagnostics.is_empty(), "{:?}", loaded.diagnostics);
     let design = loaded.design.unwrap();

@@ -145,7 +145,7 @@ fn families_and_their_members_are_known() {
 #[test]
 fn dimensions_of_other_pieces_are_known() {
     let mut editor = Editor::new();
-    let spec = "gonogo 1\nuse \"std/iso7089\"\nmaterial m {\n    kind = matt\n}\npart plate {\n    material = m\n    let depth = 10 ±0.2\n    add body = box(x = 30, y = 30, z = depth)\n}\npart washer = iso7089(d = M5)\nassembly t {\n    root plate\n    place washer on plate {\n        z = plate.depth\n    }\n    place lid = plate on washer {\n        z = (washer.h + 0)\n    }\n}\nstation s {\n    light r = room()\n}\n";
+    let spec = "gonogo 1\nuse \"std/iso7089\"\nmaterial m {\n    kind = matt\n}\npart plate {\n    material = m\n    let depth = 10 ±0.2\n    add body = box(x = 30, y = 30, z = depth)\n}\npart washer = iso7089(d = M5)\nassembly t {\n    root plate\n    place washer on plate {\n        z = plate.depth\n    }\n    place lid = plate on washer {\n        z = (washer.h + 0 * lid.depth)\n    }\n}\nstation s {\n    light r = room()\n}\n";
     editor.open("/w/a.gng", spec);
     let shown = editor.shown("/w/a.gng");
     assert!(shown.iter().all(|d| d["severity"] != 1), "{shown:#?}");

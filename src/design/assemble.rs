@@ -150,10 +150,10 @@ impl Resolver {
             };
             let Some(part) = self.piece(wanted, &name, catalogue, counts, built) else { return };
             let names = std::mem::take(&mut self.locals);
-            self.standing.ask(Some(Asking { below: seat.component, copy, copies }));
+            let own = self.standing.add(&place.name.text, names, Some(seat.component));
+            self.standing.ask(Some(Asking { own, below: seat.component, copy, copies }));
             let pose = self.pose(place, &name);
             self.standing.ask(None);
-            self.standing.add(&place.name.text, names, Some(seat.component));
             built.groups.entry(place.name.text.clone()).or_default().push(built.components.len());
             built.components.push(component(name, part, seat, pose, place.name.span));
         }
@@ -162,7 +162,10 @@ impl Resolver {
     /// Whether all that a placement needs has been placed. What is written nowhere is reported when it is looked for.
     fn ready(&self, place: &ast::Place, built: &Assembled) -> bool {
         let stands = |path: &ast::Path| built.groups.contains_key(&path.segments[0].name.text);
-        let lends = |path: &ast::Path| stands(path) || !self.written.contains(&path.segments[0].name.text);
+        let lends = |path: &ast::Path| {
+            let lender = &path.segments[0].name.text;
+            *lender == place.name.text || stands(path) || !self.written.contains(lender)
+        };
         stands(&place.on) && asked(place).into_iter().all(lends)
     }
 

@@ -2,7 +2,7 @@
 //!
 //! In: a path such as `washer.h` or `washer[2].h`, while a component is being placed. Out: that piece's own row of the
 //! table, so that what rests on a part follows its true thickness. Never reaches into features, and never into a piece that
-//! is placed later: `assemble` places what is asked before what asks.
+//! is placed later: `assemble` places what is asked before what asks. Its own piece it may ask as well: `z = oring.tube`.
 
 use super::scope::{Named, Resolver, Typed, Use};
 use crate::diag::suggest::nearest;
@@ -29,7 +29,8 @@ struct Stood {
 /// The copy that is being placed.
 #[derive(Debug, Clone, Copy)]
 pub struct Asking {
-    /// The component it stands on.
+    /// Its own place among the components, and that of the one it stands on.
+    pub own: usize,
     pub below: usize,
     /// Which of how many, counted from 0.
     pub copy: usize,
@@ -37,18 +38,23 @@ pub struct Asking {
 }
 
 impl Standing {
-    /// Notes the next component, which takes the named dimensions of its piece.
-    pub fn add(&mut self, group: &str, names: BTreeMap<String, Named>, below: Option<usize>) {
-        self.groups.entry(group.to_string()).or_default().push(self.stood.len());
+    /// Notes the next component, which takes the named dimensions of its piece. Its place among all.
+    pub fn add(&mut self, group: &str, names: BTreeMap<String, Named>, below: Option<usize>) -> usize {
+        let own = self.stood.len();
+        self.groups.entry(group.to_string()).or_default().push(own);
         self.stood.push(Stood { names, below });
+        own
     }
 
     pub fn ask(&mut self, asking: Option<Asking>) {
         self.asking = asking;
     }
 
-    /// The pieces of `group` that a path without an index means: the one below, the one of the same number, or all.
+    /// The pieces of `group` that a path without an index means: the own one, the one below, that of the same number, or all.
     fn meant(&self, group: &[usize], asking: Asking) -> Vec<usize> {
+        if group.contains(&asking.own) {
+            return vec![asking.own];
+        }
         let below = std::iter::successors(Some(asking.below), |at| self.stood.get(*at)?.below);
         if let Some(under) = below.into_iter().find(|at| group.contains(at)) {
             return vec![under];

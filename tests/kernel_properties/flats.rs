@@ -22,7 +22,7 @@ fn integral(f: impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
 
 #[test]
 fn a_flat_runs_out_through_a_chamfer_at_any_size() {
-    for (d, h) in [15.0, 14.966, 14.984, 14.9].iter().flat_map(|d| [29.8, 30.0, 30.2].map(|h| (*d, h))) {
+    for (d, h) in [15.0_f64, 14.966, 14.984, 14.9].iter().flat_map(|d| [29.8, 30.0, 30.2].map(|h| (*d, h))) {
         for (chamfer, flat) in [0.5, 1.0, 1.2, 1.6].iter().flat_map(|c| [5.5, 6.3].map(|f| (*c, f))) {
             let spec = format!(
                 "gonogo 1\ntolerances exact\nmaterial steel {{\n    metal = steel\n}}\npart shaft {{\n    material = steel\n    add journal = cylinder(d = {d}, h = {h}, chamfer_top = {chamfer})\n    cut flat = box(x = 4, y = 20, z = 16) at ({}, 0, 16)\n}}\nassembly a {{\n    root shaft\n}}\nstation s {{\n    light room = room()\n}}\n",
