@@ -308,7 +308,7 @@ mod tests {
             found[0].message,
             "`alignment_pin[1].shank.side` can meet `locking_ring.pin_hole[1].side` within tolerance"
         );
-        assert_eq!(found[0].help.as_deref(), Some("rz = 0 ±0.0063 deg"));
+        assert_eq!(found[0].help.as_deref(), Some("rz = 0 deg ±0.0063 deg"));
         assert!(
             found[0].labels[0].text.contains("0.0020 mm of clearance is left to every side"),
             "{}",
