@@ -29,6 +29,8 @@ pub(crate) struct PlacedFace {
     /// Of a cylinder all the way round between two planes square to it: its ends along the axis, from the surface's point
     /// (mm).
     pub ring: Option<[f64; 2]>,
+    /// The ends of any cylinder, whole or not, along its axis (mm from its point).
+    pub stretch: Option<[f64; 2]>,
 }
 
 /// What all copies of a solid share, in its own frame.
@@ -43,6 +45,7 @@ struct BlankFace {
     /// Over the boxes of the triangles, of faces with many.
     tree: Option<BoxTree>,
     ring: Option<[f64; 2]>,
+    stretch: Option<[f64; 2]>,
 }
 
 /// Stances that differ by less than this (mm, or half an angle in rad) are one.
@@ -79,6 +82,7 @@ impl Body {
                 outward: face.outward,
                 bounds,
                 ring: own.ring,
+                stretch: own.stretch,
             }
         };
         let faces: Vec<PlacedFace> = solid.faces.iter().zip(&blank.faces).map(place).collect();
@@ -135,7 +139,13 @@ impl Blank {
 
 impl BlankFace {
     fn new(solid: &Solid, face: &Face, triangles: Vec<u32>) -> Self {
-        let mut own = BlankFace { triangles, bounds: Bounds::EMPTY, tree: None, ring: ring(solid, face) };
+        let mut own = BlankFace {
+            triangles,
+            bounds: Bounds::EMPTY,
+            tree: None,
+            ring: ring(solid, face),
+            stretch: stretch(solid, face),
+        };
         own.bounds = own
             .corners(solid)
             .fold(Bounds::EMPTY, |b, p| Bounds { low: b.low.inf(&p.coords), high: b.high.sup(&p.coords) });
@@ -165,6 +175,14 @@ fn ring(solid: &Solid, face: &Face) -> Option<[f64; 2]> {
     };
     let (low, high) = (height(first)?, height(second)?);
     Some([low.min(high), low.max(high)])
+}
+
+/// From where to where along its axis a cylinder reaches; see [`PlacedFace::stretch`].
+fn stretch(solid: &Solid, face: &Face) -> Option<[f64; 2]> {
+    let Surface::Cylinder { point, axis, .. } = &solid.surfaces[face.surface] else { return None };
+    let samples = face.loops.iter().flatten().flat_map(|(edge, _)| &solid.edges[*edge].samples);
+    let heights = samples.map(|p| (p - point).dot(axis));
+    heights.fold(None, |ends: Option<[f64; 2]>, h| Some(ends.map_or([h; 2], |[low, high]| [low.min(h), high.max(h)])))
 }
 
 /// The middle of what two boxes share.

@@ -2,7 +2,8 @@
 //!
 //! In: two round faces that are no fit, since one is much larger than the other. Out: by how much the full one enters the
 //! hollow one, where material of both is really there: between a sleeve and what stands inside of it there is none. The
-//! columns of [`meeting`](super::meeting) see rings wider than a few of their cells only; here none is too thin.
+//! columns of [`meeting`](super::meeting) see rings wider than a few of their cells only; here none is too thin. A ring may be
+//! open, as a circlip is.
 
 use super::body::{Body, PlacedFace};
 use super::contact::{Clash, FaceRef};
@@ -36,7 +37,7 @@ pub(crate) fn squeezed(pair: [(FaceRef, &PlacedFace); 2], bodies: [&Body; 2]) ->
     let between = q - point;
     let miss = (between - axis.into_inner() * between.dot(axis)).norm();
     let ring = radius - hollow - miss;
-    let ([low, high], other) = (f.ring?, g.ring?);
+    let ([low, high], other) = (f.stretch?, g.stretch?);
     // Along the shaft's axis, from its point.
     let ends = other.map(|h| (q + m.into_inner() * h - point).dot(axis));
     let (low, high) = (low.max(ends[0].min(ends[1])), high.min(ends[0].max(ends[1])));
