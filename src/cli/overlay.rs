@@ -159,6 +159,7 @@ mod tests {
             inside: 1.0,
             unlike: Default::default(),
             strangeness: 0.0,
+            lift: None,
             faulty,
             explained: false,
         }

@@ -64,6 +64,7 @@ fn verdict() -> Verdict {
         inside: 1.0,
         unlike: Default::default(),
         strangeness: 0.0,
+        lift: None,
         faulty: true,
         explained: false,
     };

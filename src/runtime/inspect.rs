@@ -15,6 +15,7 @@ use super::model::{Model, Node};
 use super::parts::{Listener, Part, nobody};
 use super::photo::{Photo, PhotoError};
 use super::pose::Pose;
+use super::rise::{self, Lift};
 use super::settle::{self, Expected};
 use super::strange::{self, Unlikeness};
 use serde::{Deserialize, Serialize};
@@ -63,7 +64,8 @@ pub struct NodeReport {
     /// Log-likelihood ratio per coefficient of the good state against the error mode that comes closest, less that mode's
     /// threshold: faulty below zero.
     pub score: f64,
-    /// Per hypothesis, log-likelihood ratio of the good state against it, per coefficient.
+    /// Per hypothesis, log-likelihood ratio of the good state against it, per coefficient, by the image alone: [`rise::weighed`] adds
+    /// what the node's place says.
     pub against: Vec<f64>,
     /// The error mode that fits best.
     pub best_fault: String,
@@ -72,6 +74,8 @@ pub struct NodeReport {
     pub unlike: Unlikeness,
     /// By how many standard deviations that is more than correct assemblies show (see [`strange::weigh`]).
     pub strangeness: f64,
+    /// How high the component appears to stand above its place, where that can be told.
+    pub lift: Option<Lift>,
     pub faulty: bool,
     /// Faulty by itself, but explained by another component's fault.
     pub explained: bool,
@@ -250,13 +254,22 @@ impl<'a> Inspector<'a> {
         let pyramid = self.prepared.pyramid(&photo.light);
         let looks = self.looks(&pyramid, pose);
         let factor = |node: usize| f64::from(self.prepared.nodes[node].window.frame.factor);
-        let shift = |(i, look): (usize, &Look)| look.best_shift().map(|v| v * factor(i));
+        let shift = |(i, look): (usize, &Look)| look.measured_shift().map(|v| v * factor(i));
         let shifts: Vec<[f64; 2]> = looks.iter().enumerate().map(shift).collect();
         let own = |(i, look): (usize, &Look)| {
             let expected = self.expected.as_ref().map(|all| settle::in_photo(all, &shifts, i));
-            self.prepared.nodes[i].evidence(look, expected.as_ref())
+            let lift = self.lift(i, &shifts, pose);
+            Evidence { lift, ..self.prepared.nodes[i].evidence(look, expected.as_ref()) }
         };
         looks.iter().enumerate().map(own).collect()
+    }
+
+    /// How high a node's part appears to stand in a photo that shows the nodes at `shifts` (px).
+    fn lift(&self, node: usize, shifts: &[[f64; 2]], pose: &Pose) -> Option<Lift> {
+        let (rise, expected) = self.model.nodes[node].rise.as_ref().zip(self.expected.as_ref())?;
+        let (common, apart) = settle::others(expected, shifts, node);
+        let off = [0, 1].map(|k| shifts[node][k] - expected[node].at[k] - common[k]);
+        rise.lift(&self.camera, pose, off, apart)
     }
 
     /// Every node at a pose under its own hypotheses.
@@ -288,7 +301,7 @@ impl<'a> Inspector<'a> {
     fn report(&self, index: usize, evidence: &Evidence, pose: &Pose) -> NodeReport {
         let node = &self.model.nodes[index];
         let against = against(evidence, self.coefficients(index));
-        let (fault, score) = score(node, &against);
+        let (fault, score) = score(node, &rise::weighed(node, &against, evidence.lift));
         NodeReport {
             name: node.name.clone(),
             level: node.level,
@@ -300,6 +313,7 @@ impl<'a> Inspector<'a> {
             inside: evidence.inside,
             unlike: evidence.unlike.clone(),
             strangeness: 0.0,
+            lift: evidence.lift,
             // What is no number is no proof of anything.
             faulty: score.is_nan() || score < 0.0,
             explained: false,

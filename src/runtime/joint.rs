@@ -286,6 +286,7 @@ impl<'a> RigInspector<'a> {
                 inside: nodes().map(|n| n.inside).fold(0.0, f64::max),
                 unlike: Default::default(),
                 strangeness: nodes().map(|n| n.strangeness).fold(0.0, f64::max),
+                lift: None,
                 faulty: weighed.is_faulty(),
                 explained: weighed.is_faulty() && !blamed.contains(&i),
             }

@@ -10,6 +10,7 @@ use super::look::Look;
 use super::model::{Image, Model, Node};
 use super::parts::{Listener, Part, nobody};
 use super::pose::Pose;
+use super::rise::Lift;
 use super::settle::Expected;
 use super::sight::{Glance, Reduced, Sight};
 use super::strange::{self, Unlikeness};
@@ -150,6 +151,8 @@ pub struct Evidence {
     pub inside: f64,
     /// Best shift under the good state (node px).
     pub shift: [f64; 2],
+    /// How high the part appears to stand; `None` before calibration, and where that cannot be told.
+    pub lift: Option<Lift>,
     /// How far from the first density the node is, square by square: mean of [`Density::surprise`].
     pub unlike: Unlikeness,
 }
@@ -208,7 +211,7 @@ impl NodeImages {
         (look.listener)(Part::Unknown);
         let unlike = strange::unlikeness(&self.stencil.square_means(&look.densities[0].surprise(coefficients)));
         let log_likelihoods = std::iter::once(good.0).chain(others).collect();
-        Evidence { log_likelihoods, inside: look.inside, shift, unlike }
+        Evidence { log_likelihoods, inside: look.inside, shift, lift: None, unlike }
     }
 
     /// The shift (node px) at which a density fits best.
@@ -233,9 +236,9 @@ impl NodeImages {
         pose: &Pose,
     ) -> (Grid, [f64; 2]) {
         let good = &self.rendered(light, noise)[0];
-        let shift = self.best_shift(good, light, reduced, camera, pose);
-        let window = self.window.cut(&reduced.grid, &self.window.place(camera, pose), shift);
-        (window, shift.map(|v| v * f64::from(self.window.frame.factor)))
+        let look = self.look(std::slice::from_ref(good), light, reduced, camera, pose, &nobody);
+        let window = self.window.cut(&reduced.grid, &self.window.place(camera, pose), look.best_shift());
+        (window, look.measured_shift().map(|v| v * f64::from(self.window.frame.factor)))
     }
 
     /// The node's coefficients at a pose, and which of them touch clipped pixels.

@@ -166,6 +166,36 @@ impl<'a> Look<'a> {
     pub fn best_shift(&self) -> [f64; 2] {
         self.shift(self.likeliest(0, &self.free(), 1.0).1)
     }
+
+    /// The same between the shifts tried: where a parabola through the best and those beside it has its top, along either axis.
+    pub fn measured_shift(&self) -> [f64; 2] {
+        let best = self.likeliest(0, &self.free(), 1.0).1;
+        let at = self.shift(best);
+        let here = self.fits[0].iter().find(|(i, _)| *i == best).map_or(0.0, |(_, fit)| *fit);
+        [0, 1].map(|axis| {
+            // (distance, fit) of the nearest on either side.
+            let beside = |side: f64| {
+                let along = |&(i, fit): &(usize, f64)| {
+                    let shift = self.shift(i);
+                    let far = (shift[axis] - at[axis]) * side;
+                    (shift[1 - axis] == at[1 - axis] && far > 0.0).then_some((far, fit))
+                };
+                self.fits[0].iter().filter_map(along).min_by(|a, b| a.0.total_cmp(&b.0))
+            };
+            let top = beside(-1.0).zip(beside(1.0)).and_then(|(below, above)| top(below, here, above));
+            at[axis] + top.unwrap_or(0.0)
+        })
+    }
+}
+
+/// Where a parabola through three points, (distance below, value), value at 0 and (distance above, value), has its top: at most half
+/// way to its neighbours. `None` where it has none.
+fn top(below: (f64, f64), here: f64, above: (f64, f64)) -> Option<f64> {
+    let ((a, left), (b, right)) = (below, above);
+    let (down, up) = ((left - here) / a, (right - here) / b);
+    let bend = down + up;
+    let top = (up * a - down * b) / -(2.0 * bend);
+    (bend < 0.0).then(|| top.clamp(-a / 2.0, b / 2.0))
 }
 
 /// A node at a shift in half px of the photo.
@@ -186,4 +216,20 @@ fn steps(spread: f64, factor: f64) -> Vec<i32> {
     let count = (reach / step).round() as i32;
     let halves = (2.0 * step) as i32;
     (-count..=count).map(|i| i * halves).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_has_its_top_where_it_was_drawn() {
+        for at in [-0.2, 0.0, 0.15] {
+            let value = |x: f64| 3.0 - 2.0 * (x - at) * (x - at);
+            let found = top((0.5, value(-0.5)), value(0.0), (1.0, value(1.0))).unwrap();
+            assert!((found - at).abs() < 1e-12, "{found} for {at}");
+        }
+        assert_eq!(top((0.5, 1.0), 0.0, (0.5, 1.0)), None, "a valley has no top");
+        assert_eq!(top((1.0, -9.0), 0.0, (1.0, 8.0)), Some(0.5), "at most half way");
+    }
 }

@@ -24,6 +24,7 @@ pub mod photo;
 pub mod pose;
 pub mod report;
 pub mod rig;
+pub mod rise;
 pub mod row;
 pub mod settle;
 pub mod sight;

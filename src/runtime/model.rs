@@ -6,12 +6,13 @@
 
 use super::camera::Camera;
 use super::photo::Tone;
+use super::rise::Rise;
 use super::row::Row;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The format this version writes, and the only one it reads so far.
-pub const FORMAT: u32 = 5;
+pub const FORMAT: u32 = 6;
 /// Sizes of squares in which a node is held against its good state: the cells of its coarsest level and of the one before.
 pub const SCALES: usize = 3;
 /// Larger files are refused before they are parsed (bytes).
@@ -185,6 +186,8 @@ pub struct Node {
     /// What held-out good renders show of what this model does not know: for the squares of the coarsest level, then for those of
     /// the levels before; all of them, or none in a model that was not held against renders.
     pub usual: Vec<Usual>,
+    /// How the part rises from its seat, where its place in the image can tell.
+    pub rise: Option<Rise>,
     /// The first is the good state.
     pub hypotheses: Vec<Hypothesis>,
     /// What the good state looks like beside the faults of other components.
@@ -358,6 +361,7 @@ impl Node {
         ensure(matches!(self.usual.len(), 0 | SCALES), "node usual sizes")?;
         let in_range = |u: &Usual| u.excess.iter().all(|v| v.is_finite()) && u.excess[1] > 0.0;
         ensure(self.usual.iter().all(in_range), "node usual out of range")?;
+        ensure(self.rise.iter().all(Rise::is_sound), "node rise out of range")?;
         ensure(self.parent.is_none_or(|p| (p as usize) < nodes), "node parent out of range")?;
         ensure(self.disturbs.iter().all(|&d| (d as usize) < nodes), "disturbed node out of range")?;
         ensure(self.mask.len() == height as usize, "mask rows")?;

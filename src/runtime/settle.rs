@@ -44,20 +44,28 @@ pub fn after(node: &Node, seen: &[[f64; 2]]) -> Expected {
 /// The same in a photo that shows all nodes at `shifts` (px): what the other nodes have in common is the pose's doing, and where
 /// they disagree no place is sure.
 pub fn in_photo(expected: &[Expected], shifts: &[[f64; 2]], node: usize) -> Expected {
-    let mut out = expected[node];
+    let (common, apart) = others(expected, shifts, node);
+    let own = expected[node];
+    Expected { at: [0, 1].map(|k| own.at[k] + common[k]), spread: [0, 1].map(|k| length(own.spread[k], apart[k])) }
+}
+
+/// What the other nodes of a photo have in common beside where they are expected (px), and by how much they disagree: a standard
+/// deviation. Nothing where they are few.
+pub fn others(expected: &[Expected], shifts: &[[f64; 2]], node: usize) -> ([f64; 2], [f64; 2]) {
+    let (mut common, mut apart) = ([0.0; 2], [0.0; 2]);
     if expected.len() <= LEAST_OTHERS {
-        return out;
+        return (common, apart);
     }
     let others: Vec<usize> = (0..expected.len()).filter(|&i| i != node).collect();
-    for (axis, at) in out.at.iter_mut().enumerate() {
+    for axis in 0..2 {
         let off: Vec<f32> = others.iter().map(|&i| (shifts[i][axis] - expected[i].at[axis]) as f32).collect();
-        let common = linear::median(&mut off.clone());
-        let apart = linear::median(&mut off.iter().map(|o| (o - common).abs()).collect::<Vec<_>>());
-        *at += f64::from(common);
+        let middle = linear::median(&mut off.clone());
+        let distance = linear::median(&mut off.iter().map(|o| (o - middle).abs()).collect::<Vec<_>>());
+        common[axis] = f64::from(middle);
         // The median distance of a normal variable from its mean is 0.6745 standard deviations.
-        out.spread[axis] = length(out.spread[axis], f64::from(apart) / 0.6745);
+        apart[axis] = f64::from(distance) / 0.6745;
     }
-    out
+    (common, apart)
 }
 
 #[cfg(test)]

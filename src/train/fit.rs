@@ -3,6 +3,7 @@
 use super::edges::{self, Ground};
 use super::plan::{NodePlan, Plan};
 use super::shots::Shot;
+use super::stats::rounded;
 use super::synthesise::Shots;
 use crate::assembly::fault::{ErrorMode, FaultKind, Motion, swept};
 use crate::design::model::Design;
@@ -13,6 +14,7 @@ use crate::runtime::light::Light;
 use crate::runtime::locate::EdgePoint;
 use crate::runtime::model::{Disturbed, Hypothesis, Image, Lamp, Locator, Node, PointGroup, PointSet};
 use crate::runtime::pose::Pose;
+use crate::runtime::rise::Rise;
 use crate::runtime::row::Row;
 use crate::runtime::sight::Reduced;
 use crate::runtime::window::{Window, runs_of};
@@ -157,12 +159,27 @@ impl Cutter<'_> {
             spread: plan.spread,
             disturbs: plan.disturbs.clone(),
             usual: Vec::new(),
+            rise: self.rise(),
             good_scores: Vec::new(),
             fault_scores: Vec::new(),
             hypotheses,
             disturbed,
             steps,
         }
+    }
+
+    /// The way out of the seat that the component may have stopped short on.
+    fn rise(&self) -> Option<Rise> {
+        let (context, plan) = (self.context, self.plan);
+        let direction = plan.modes.iter().find_map(|&m| match context.modes[m].motion {
+            Motion::Slide { direction, .. } => Some(direction),
+            _ => None,
+        })?;
+        let [x0, y0, x1, y1] = plan.visible;
+        let middle = [(x0 + x1) / 2.0, (y0 + y1) / 2.0];
+        let at = context.home.invert(context.camera.on_plane(middle, plan.frame.plane + context.home.z)?);
+        // Measured with held-out renders.
+        Some(Rise { direction, at: at.map(rounded), shown: None })
     }
 
     /// The node's window in every shot and lamp of a sample.

@@ -7,14 +7,21 @@ use super::stats::{normal_quantile, rounded};
 use crate::runtime::inspect;
 use crate::runtime::judge::INDEPENDENT;
 use crate::runtime::model::Node;
+use crate::runtime::rise::{Lift, Shown};
 
 /// Share of the lowest goods and the highest faults left out when asking whether they overlap: photos in which the pose
 /// went wrong, which say nothing about the node.
 pub(super) const TRIM: f64 = 0.1;
 /// Fewer faulty renders say nothing of a hypothesis by themselves.
 const FEWEST: usize = 4;
+/// Who finds next to nothing gains nothing by coming near the goods: their spread, of which a few dozen renders of a few stations
+/// tell little, counts so many times.
+const SILENT: f64 = 2.0;
 /// Share of a normal variable more than one standard deviation below its mean.
 const ONE_DEVIATION_DOWN: f64 = 0.16;
+/// Standard deviation of a part's place in a photo (px) although it is in its place, beside what renders show of that: edges are not
+/// quite as rendered.
+const LEAST_PLACE: f64 = 0.2;
 
 /// What the held-out renders showed of one node: per render the ratio against each hypothesis.
 pub struct Seen {
@@ -57,6 +64,7 @@ fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
 /// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap, that of the goods reaches below zero or less than half of
 /// the faulty renders are found, ratios are not what they say, and the spread of the goods may take more.
 /// Ratios are natural logarithms, a ratio of 1 being that of `independent` coefficients' worth.
+/// What then finds less than a quarter of the faulty renders that show most is kept far from the goods.
 /// Never a quantile of the goods: their few lowest scores say nothing about a photo's.
 pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independent: f64) -> f64 {
     if good.is_empty() || fault.is_empty() {
@@ -78,8 +86,33 @@ pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independ
     distances.sort_by(f64::total_cmp);
     // The median distance of a normal variable from its mean is 0.6745 standard deviations.
     let deviation = at_share(&distances, 0.5) / 0.6745;
-    let by_spread = middle - normal_quantile(1.0 - false_reject) * deviation;
-    by_spread.min(by_ratio)
+    let by_spread = |deviations: f64| (middle - deviations * deviation).min(by_ratio);
+    let usual = normal_quantile(1.0 - false_reject);
+    let shown = most_shown(fault);
+    let found = shown.iter().filter(|f| **f < by_spread(usual)).count();
+    by_spread(if 4 * found >= shown.len() { usual } else { SILENT * usual })
+}
+
+/// From how high a part appears to stand in correct assemblies and where it is not seated, and how far (px) its image moves per mm
+/// of rise. `None` where that does not tell one from the other.
+pub(super) fn shown(good: &[Lift], faulty: &[Lift], px_per_mm: f64) -> Option<Shown> {
+    let lifts = |all: &[Lift], value: &dyn Fn(&Lift) -> f64| {
+        let mut out: Vec<f64> = all.iter().map(value).collect();
+        out.sort_by(f64::total_cmp);
+        (!out.is_empty()).then_some(out)
+    };
+    let seated = lifts(good, &|l| l.mm)?;
+    let (low, high) = (at_share(&seated, ONE_DEVIATION_DOWN), at_share(&seated, 1.0 - ONE_DEVIATION_DOWN));
+    let deviation = high.max(-low).max(LEAST_PLACE / px_per_mm);
+    let unsure = at_share(&lifts(good, &|l| l.unsure)?, 0.5).max(LEAST_PLACE / px_per_mm);
+    let middle = at_share(&lifts(faulty, &|l| l.mm)?, 0.5).max(0.0);
+    let spread = at_share(&lifts(faulty, &|l| (l.mm - middle).abs())?, 0.5) / 0.6745;
+    let raised = [middle, spread.max(deviation)];
+    (middle > deviation).then(|| Shown {
+        seated: rounded(deviation),
+        unsure: rounded(unsure),
+        raised: raised.map(rounded),
+    })
 }
 
 /// Share of a normal variable below zero, from its mean and its deviation downwards: Chernoff's bound, halved.
@@ -129,9 +162,10 @@ mod tests {
     fn what_finds_next_to_nothing_rejects_nothing() {
         let good = [0.01, 0.02, 0.05, 0.08, 0.1, 0.12, 0.15, 0.18, 0.2];
         let limit = |fault: &[f64]| threshold(&good, fault, 1e-3, INDEPENDENT);
-        let spread = 0.1 - 3.0902 * 0.05 / 0.6745;
-        assert!(limit(&[-0.3, 0.0, 0.05, 0.1, 0.1]) < spread + 1e-3);
-        assert!(limit(&[-0.3, -0.3, -0.3, 0.05, 0.1]) > spread + 0.05, "most are found");
+        let spread = |deviations: f64| 0.1 - deviations * 3.0902 * 0.05 / 0.6745;
+        assert!((limit(&[-0.3, 0.0, 0.05, 0.1, 0.1]) - spread(1.0)).abs() < 1e-3, "one of the three that show most");
+        assert!((limit(&[-0.1, 0.0, 0.05, 0.1, 0.1]) - spread(SILENT)).abs() < 1e-3, "none");
+        assert!(limit(&[-0.3, -0.3, -0.3, 0.05, 0.1]) > spread(1.0) + 0.05, "most are found");
     }
 
     /// Of a sweep the large half lies apart, the small half does not: it alone has the spread's threshold.
@@ -158,9 +192,24 @@ mod tests {
 
     #[test]
     fn where_they_overlap_the_spread_of_the_goods_decides_if_it_takes_more() {
-        let limit = |good: &[f64]| threshold(good, &[-0.2, -0.1, 0.0, 0.1], 1e-3, INDEPENDENT);
+        let limit = |good: &[f64]| threshold(good, &[-0.3, -0.1, 0.0, 0.1], 1e-3, INDEPENDENT);
         let (by_spread, by_ratio) = (|deviation: f64| -3.0902 * deviation / 0.6745, -(0.5f64 / 1e-3).ln() / 100.0);
         assert!((limit(&[-0.010, -0.005, 0.0, 0.005, 0.010]) - by_ratio).abs() < 1e-9, "what the ratio takes");
         assert!((limit(&[-0.1, -0.05, 0.0, 0.05, 0.1]) - by_spread(0.05)).abs() < 1e-3, "renders belie the ratio");
+    }
+
+    /// Seated parts within 0.1 mm, raised ones from 0.5 to 1 mm; an image that moves by 10 px per mm tells 0.02 mm at best, one
+    /// by 1 px per mm 0.2 mm.
+    #[test]
+    fn a_place_tells_raised_from_seated_only_where_it_can() {
+        let lifts = |mm: &[f64]| mm.iter().map(|&mm| Lift { mm, unsure: 0.05 }).collect::<Vec<_>>();
+        let good = lifts(&[-0.1, -0.05, -0.05, 0.0, 0.0, 0.05, 0.1]);
+        let raised = lifts(&[0.5, 0.6, 0.7, 0.8, 1.0]);
+        let of = |good: &[Lift], px_per_mm: f64| shown(good, &raised, px_per_mm);
+        assert_eq!(of(&good, 10.0), Some(Shown { seated: 0.05, unsure: 0.05, raised: [0.7, rounded(0.1 / 0.6745)] }));
+        assert_eq!(of(&good, 1.0).map(|s| (s.seated, s.raised)), Some((0.2, [0.7, 0.2])));
+        assert_eq!(of(&lifts(&[-1.0, -0.9, -0.8, 0.0, 0.8, 0.9, 1.0]), 10.0), None, "seated parts scatter as much");
+        assert_eq!(of(&[], 10.0), None);
+        assert_eq!(shown(&good, &[], 10.0), None);
     }
 }

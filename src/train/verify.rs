@@ -10,7 +10,7 @@ use super::shots::Shot;
 use super::stats::{rate, rounded};
 use super::synthesise::{FaultyShot, Shots};
 use super::thresholds;
-use crate::assembly::fault::ErrorMode;
+use crate::assembly::fault::{ErrorMode, Motion};
 use crate::design::model::{Design, Station};
 use crate::rng::Stream;
 use crate::runtime::calibrate::{self, Calibration};
@@ -20,7 +20,8 @@ use crate::runtime::inspect::{self, Decision, Inspector, Verdict};
 use crate::runtime::light::{range, within};
 use crate::runtime::model::{Lamp, ModeRate, Model, Promise, Usual};
 use crate::runtime::photo::Photo;
-use crate::runtime::pose::Installation;
+use crate::runtime::pose::{Installation, Pose};
+use crate::runtime::rise::{self, Lift};
 use crate::runtime::strange::{self, Unlikeness};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -189,6 +190,7 @@ pub fn judge_all(
 /// Writes thresholds and promise into the model.
 pub fn settle(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], held_out: &HeldOut) {
     let HeldOut { judged, unfit, .. } = held_out;
+    set_rises(model, design, scenes, modes, judged);
     set_thresholds(model, design, scenes, modes, judged);
     set_usual(model, judged);
     model.locator.accept = accept(judged, model.locator.unsigned);
@@ -260,7 +262,7 @@ fn order(good: &[f64], fault: &[f64]) -> f64 {
 fn set_thresholds(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], judged: &[Judged]) {
     let nodes = model.nodes.len() as f64;
     for (index, node) in model.nodes.iter_mut().enumerate() {
-        let against = |verdict: &Verdict| verdict.nodes.get(index).map(|n| n.against.clone());
+        let against = |verdict: &Verdict| verdict.nodes.get(index).map(|n| rise::weighed(node, &n.against, n.lift));
         let of = |kind: &str| {
             let own =
                 |m: &usize| design.components[modes[*m].component].name == node.name && modes[*m].kind.word() == kind;
@@ -289,6 +291,25 @@ fn set_usual(model: &mut Model, judged: &[Judged]) {
     }
 }
 
+/// How high the components appear to stand, seated and not.
+fn set_rises(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], judged: &[Judged]) {
+    let (camera, home) = (model.station.camera, Pose::home(&model.station));
+    for (index, node) in model.nodes.iter_mut().enumerate() {
+        let Some(along) = node.rise.as_ref().and_then(|rise| rise.seen(&camera, &home)) else { continue };
+        let lift = |verdict: &Verdict| verdict.nodes.get(index)?.lift;
+        let good: Vec<Lift> = judged.iter().flat_map(|j| &j.good).filter_map(lift).collect();
+        let own = |m: &usize| {
+            design.components[modes[*m].component].name == node.name && matches!(modes[*m].motion, Motion::Slide { .. })
+        };
+        let scenes = judged.iter().flat_map(|j| j.faulty.iter().zip(scenes));
+        let shown = scenes.filter(|(_, scene)| scene.iter().any(own));
+        let faulty: Vec<Lift> = shown.flat_map(|(verdicts, _)| verdicts).filter_map(lift).collect();
+        if let Some(rise) = node.rise.as_mut() {
+            rise.shown = thresholds::shown(&good, &faulty, along[0].hypot(along[1]));
+        }
+    }
+}
+
 /// Renders are re-synthesised by what rendered them, photos are not: a photo may fall this far behind. What correlates less
 /// than [`POOREST_FIT`] of a fit that renders reach shows something else.
 fn least_correlation(judged: &[Judged]) -> f64 {
@@ -314,7 +335,10 @@ pub(super) fn promise(
     unfit: usize,
 ) -> Promise {
     // The verdicts were taken before the thresholds were known.
-    let faulty = |v: &Verdict, node: usize| inspect::score(&model.nodes[node], &v.nodes[node].against).1 < 0.0;
+    let faulty = |v: &Verdict, node: usize| {
+        let (of, seen) = (&model.nodes[node], &v.nodes[node]);
+        inspect::score(of, &rise::weighed(of, &seen.against, seen.lift)).1 < 0.0
+    };
     let unknown = |j: &Judged, v: &Verdict| {
         let mut nodes = v.nodes.clone();
         strange::weigh(&mut nodes, &model.nodes, &j.calibrated);

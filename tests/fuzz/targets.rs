@@ -180,6 +180,7 @@ pub fn tiny() -> Model {
             disturbs: vec![],
             steps: vec![0.01],
             usual: Vec::new(),
+            rise: None,
             good_scores: vec![0.1, 0.2],
             fault_scores: vec![],
             hypotheses: vec![images("good", 90), images("missing", 9)],

@@ -55,6 +55,7 @@ fn in_full_the_line_goes_on_with_boxes_and_scores() {
         inside: 1.0,
         unlike: Default::default(),
         strangeness: 0.0,
+        lift: None,
         faulty: true,
         explained: false,
     });
