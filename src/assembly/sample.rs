@@ -174,7 +174,7 @@ impl Shop {
                 components: self.components,
                 measures: Vec::new(),
                 stations: Vec::new(),
-                inspect: Inspect { watch, false_reject: 0.01, span: Span::default() },
+                inspect: Inspect { watch, root: false, false_reject: 0.01, span: Span::default() },
                 train: Train { images: 1, seed: 1, levels: 3, samples: 1, uniform: true },
             },
         }

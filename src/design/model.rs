@@ -388,6 +388,8 @@ impl Station {
 pub struct Inspect {
     /// Watched components (indices), in the order of [`Design::components`].
     pub watch: Vec<Watch>,
+    /// Whether what lies on the root counts too. It stands where it stands: no error mode is its own.
+    pub root: bool,
     /// Share of good assemblies that may be rejected.
     pub false_reject: f64,
     #[serde(skip)]

@@ -16,7 +16,7 @@ const FALSE_REJECT: f64 = 0.001;
 const IMAGES: u64 = 14;
 
 impl Resolver {
-    /// Without `watch` every component but the root is watched.
+    /// Without `watch` every component is watched; the root, which has no faults of its own, for what may lie on it.
     pub fn inspect(&mut self, body: Option<(&Body, Span)>, built: &Assembled) -> Inspect {
         let nothing = Body::default();
         let (body, span) = body.unwrap_or((&nothing, Span::default()));
@@ -26,13 +26,20 @@ impl Resolver {
         let all = !body.lines.iter().any(statements);
         let mut depths: Vec<Option<Option<u32>>> =
             (0..built.components.len()).map(|i| (all && i > 0).then_some(None)).collect();
+        let mut root = all && !built.components.is_empty();
         for line in &body.lines {
             match &line.stmt {
                 Stmt::Watch { path, args } => {
                     let depth = args.as_ref().and_then(|args| self.depth(args, path));
-                    self.watched(path, built).into_iter().for_each(|i| depths[i] = Some(depth));
+                    let named = self.watched(path, built);
+                    root |= named.contains(&0);
+                    named.into_iter().for_each(|i| depths[i] = Some(depth));
                 }
-                Stmt::Ignore(path) => self.watched(path, built).into_iter().for_each(|i| depths[i] = None),
+                Stmt::Ignore(path) => {
+                    let named = self.watched(path, built);
+                    root &= !named.contains(&0);
+                    named.into_iter().for_each(|i| depths[i] = None);
+                }
                 _ => {}
             }
         }
@@ -49,7 +56,7 @@ impl Resolver {
             );
         }
         let false_reject = self.exact_or(&fields, "false_reject", Quantity::Ratio, FALSE_REJECT, [1e-9, 0.5]);
-        Inspect { watch, false_reject, span }
+        Inspect { watch, root, false_reject, span }
     }
 
     fn depth(&mut self, args: &Args, path: &Path) -> Option<u32> {

@@ -120,7 +120,7 @@ pub const KEYWORDS: &[Keyword] = &[
     word("station", "vary", "vary {\n    $0\n}", "what varies from photo to photo"),
     word("camera", "fixed", "", "the camera stands where the spec says"),
     word("camera", "auto", "", "the compiler chooses the camera's place within ranges"),
-    word("inspect", "watch", "watch $0", "watches a component; without any, all but the root are watched"),
+    word("inspect", "watch", "watch $0", "watches a component; without any, all are watched"),
     word("inspect", "ignore", "ignore $0", "takes a component out"),
     word("dimension", "basic", "", "exactly this, whatever the general tolerance"),
     word("dimension", "each", "", "every copy of the pattern has its own"),

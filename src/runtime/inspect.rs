@@ -423,7 +423,7 @@ pub fn light(model: &Model, weights: &[f64]) -> Light {
 }
 
 /// The likeliest error mode beyond its threshold, else the one that comes closest to it, and the least that any mode leaves to
-/// its threshold.
+/// its threshold; 0 where there is none.
 pub fn score(node: &Node, against: &[f64]) -> (Option<usize>, f64) {
     let left = |h: usize| against[h] - node.hypotheses[h].threshold;
     let modes = || 1..node.hypotheses.len();
@@ -432,7 +432,7 @@ pub fn score(node: &Node, against: &[f64]) -> (Option<usize>, f64) {
     }
     let likeliest = modes().filter(|&h| left(h) < 0.0).min_by(|&a, &b| against[a].total_cmp(&against[b]));
     let closest = modes().min_by(|&a, &b| left(a).total_cmp(&left(b)));
-    (likeliest.or(closest), closest.map_or(f64::INFINITY, left))
+    (likeliest.or(closest), closest.map_or(0.0, left))
 }
 
 fn against(evidence: &Evidence, coefficients: usize) -> Vec<f64> {

@@ -242,7 +242,7 @@ pub fn locator(context: &Context) -> Locator {
     let found = points(context, &good, "good", &on_datum, 1.0, None, false);
     let unsigned = found.fine.len() < ENOUGH_DATUM_POINTS;
     let mut groups = if unsigned {
-        plan.nodes.iter().map(|node| component_group(context, node)).collect()
+        plan.nodes.iter().filter(|n| !n.modes.is_empty()).map(|node| component_group(context, node)).collect()
     } else {
         by_component(context, &found)
     };

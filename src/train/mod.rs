@@ -252,7 +252,9 @@ fn hang(nodes: &mut [Node], design: &Design, tree: &ErrorTree) {
     let place = |name: &str| tree.nodes.iter().position(|t| design.components[t.component].name == name);
     let names: Vec<String> = nodes.iter().map(|n| n.name.clone()).collect();
     let above = |at: usize| std::iter::successors(tree.nodes[at].parent, |&p| tree.nodes[p].parent);
-    let node_at = |at: usize| names.iter().position(|n| *n == design.components[tree.nodes[at].component].name);
+    // What stands on the root is not below the root's own node: that knows nothing of where it stands.
+    let named = |at: usize| names.iter().position(|n| *n == design.components[tree.nodes[at].component].name);
+    let node_at = |at: usize| named(at).filter(|_| tree.nodes[at].parent.is_some());
     for node in nodes {
         let ancestors: Vec<usize> = place(&node.name).into_iter().flat_map(above).filter_map(node_at).collect();
         node.parent = ancestors.first().map(|&p| p as u32);

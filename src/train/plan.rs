@@ -42,6 +42,9 @@ const COARSEST: u32 = 4;
 /// As long as the assembly's box has no more px of the shots than this, finer ones cost little and show smaller faults.
 const AFFORDABLE: u32 = 60_000;
 
+/// The component that everything stands on.
+const ROOT: usize = 0;
+
 /// One node to be trained.
 pub struct NodePlan {
     pub component: usize,
@@ -83,7 +86,28 @@ pub struct Plan {
 pub fn plan(design: &Design, camera: &Camera, nominal: &Drawn, liaison: &Liaison, modes: &[ErrorMode]) -> Plan {
     let draft = draft(design, camera, nominal, modes);
     let scenes = gather(modes, &[&draft.changes]);
-    finished(design, camera, nominal, liaison, modes, draft, &scenes)
+    let mut plan = finished(design, camera, nominal, liaison, modes, draft, &scenes);
+    if design.inspect.root {
+        plan.nodes.extend(ground(design, camera, nominal, &plan));
+    }
+    plan
+}
+
+/// The root's node: what shows of it beside the other nodes. It has no error modes, but something may lie on it.
+fn ground(design: &Design, camera: &Camera, nominal: &Drawn, plan: &Plan) -> Option<NodePlan> {
+    let reach = plan.nodes.iter().map(|node| node.reach.clone()).reduce(united)?;
+    let own = plan.good.mask(ROOT);
+    // Not where the root ends: beyond it the floor shows, and what stands on it casts its shadow.
+    let not_own = Mask { bits: own.bits.iter().map(|own| !own).collect(), ..own };
+    let beside = dilate(&united(not_own, reach.clone()), 2 * WIDEN);
+    let changed = Mask { bits: beside.bits.iter().map(|beside| !beside).collect(), ..reach };
+    if changed.count() < LEAST_OWN {
+        return None;
+    }
+    let view = View { drawn: nominal, camera: &camera.reduced(plan.base), good: plan.good.clone() };
+    let none = Mask { bits: vec![false; changed.bits.len()], ..changed };
+    let area = NodeArea { component: ROOT, modes: Vec::new(), changed, reach: none };
+    node(design, camera, &view, plan.base, area)
 }
 
 /// Plans for several cameras that look at the same assemblies: the scenes are common to all, so that in each of them every
@@ -446,5 +470,40 @@ mod tests {
             assert!(at(&node.reach), "{spacer}: the lid comes down");
             assert_eq!(at(&node.changed), !shows, "{spacer}");
         }
+    }
+
+    /// Pins on a plate: the plate's node is where neither they nor their faults show, and only where it is watched.
+    #[test]
+    fn the_roots_node_is_what_shows_of_it_beside_the_others() {
+        let plan_of = |inspect: &str| {
+            let text = format!(
+                "gonogo 1\nunits mm deg\ntolerances exact\nmaterial paint {{\n kind = matt\n}}\n\
+                 part base {{\n material = paint\n add slab = box(x = 60, y = 60, z = 4)\n}}\n\
+                 part pin {{\n material = paint\n add rod = cylinder(d = 8, h = 6)\n}}\n\
+                 assembly board {{\n root base\n place pin on base {{\n  z = 4\n }}\n}}\n\
+                 station bench {{\n camera fixed {{\n image = 160 x 120 px\n focal = 16\n pitch = 0.03\n distance = 400\n elevation = 80\n}}\n\
+                 light room = room()\n}}\n{inspect}"
+            );
+            let loaded = design::load("board.gng", &|_| Ok(text.clone()), &[]);
+            let design = loaded.design.unwrap_or_else(|| panic!("{:#?}", loaded.diagnostics));
+            let station = &design.stations[0];
+            let nominal = shots::nominal(&design, station).unwrap();
+            let (found, _) = assembly::analyse(&design, &nominal.solids);
+            let modes = assembly::fault::all(&design, &found.liaison, &found.insertion, &nominal.solids);
+            let camera = camera(&station.camera, Placed { distance: 400.0, elevation: 1.4, azimuth: -FRAC_PI_2 });
+            plan(&design, &camera, &nominal, &found.liaison, &modes)
+        };
+        let plan = plan_of("");
+        let [pin, base] = &plan.nodes[..] else { panic!("{} nodes", plan.nodes.len()) };
+        assert_eq!((pin.component, base.component), (1, ROOT));
+        assert!(base.modes.is_empty() && base.disturbs.is_empty() && base.disturbed.is_empty());
+        let shown = plan.good.mask(ROOT);
+        assert!(base.changed.count() > shown.count() / 2 && base.changed.count() < shown.count());
+        let own = |i: usize| shown.bits[i] && !pin.reach.bits[i];
+        assert!((0..shown.bits.len()).all(|i| !base.changed.bits[i] || own(i)));
+        for inspect in ["inspect board {\n watch pin\n}\n", "inspect board {\n ignore base\n}\n"] {
+            assert_eq!(plan_of(inspect).nodes.len(), 1, "{inspect}");
+        }
+        assert_eq!(plan_of("inspect board {\n watch base\n watch pin\n}\n").nodes.len(), 2);
     }
 }

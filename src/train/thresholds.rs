@@ -34,6 +34,9 @@ pub struct Seen {
 /// that hardly differs from the good state must not make the node blind to one that does, nor a small fault to a large one: so
 /// each hypothesis has its own, from the renders of its mode that look most like it.
 pub fn set(node: &mut Node, seen: &Seen, false_reject: f64) {
+    if node.hypotheses.len() < 2 {
+        return;
+    }
     let share = false_reject / node.hypotheses.len().saturating_sub(1).max(1) as f64;
     for (kind, faulty) in &seen.faulty {
         let own: Vec<usize> = (1..node.hypotheses.len()).filter(|&h| node.hypotheses[h].fault == *kind).collect();
