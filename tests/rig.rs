@@ -96,8 +96,8 @@ fn warnings_are_about_the_cameras_together() {
 #[test]
 fn the_promise_is_of_the_joint_verdict() {
     let promise = &rig().promise;
-    // Six customers with five goods each beside that for calibration, and two of every fault that any camera shows.
-    assert_eq!(promise.false_reject.trials, 30);
+    // Six customers with eight goods each beside that for calibration, and two of every fault that any camera shows.
+    assert_eq!(promise.false_reject.trials, 48);
     assert!(promise.modes.iter().all(|m| m.escape.trials == 12), "{promise:?}");
     let escaped = |component: &str, fault: &str| {
         let of = promise.modes.iter().find(|m| m.component == component && m.fault == fault);
@@ -224,7 +224,7 @@ fn what_does_not_fit_together_is_refused() {
     let refused = |text: &str| Rig::read(text).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(refused(&text.replacen("two_views", "two_lies!", 1)).starts_with("E0802: "));
     assert!(refused(&text[..text.len() / 2]).starts_with("E0802: "));
-    assert!(refused(&text.replacen("format: 5", "format: 6", 1)).starts_with("E0801: "));
+    assert!(refused(&text.replacen("format: 6", "format: 7", 1)).starts_with("E0801: "));
 }
 
 #[test]

@@ -38,8 +38,11 @@ fn list(assembly: &Assembly) -> String {
         let part = &design.parts[component.part];
         let material = &design.materials[part.material].name;
         let touches = assembly.analysis.map(|a| format!(" · {}", count(a.liaison.of(i).count(), "contact")));
-        let watched = design.inspect.watch.iter().any(|w| w.component == i);
-        let watched = if watched { "" } else { " · not watched" };
+        let watched = match design.inspect.watch.iter().any(|w| w.component == i) {
+            true => "",
+            false if i == 0 && design.inspect.root => " · watched for what lies on it",
+            false => " · not watched",
+        };
         format!(
             "<li><button type=\"button\" data-c=\"{i}\"><i style=\"background:{}\">{}</i><span>{}\
              <small>{}{}{watched}</small></span></button></li>\n",

@@ -60,6 +60,7 @@ fn design(components: usize, watch: &[usize]) -> Design {
         stations: Vec::new(),
         inspect: Inspect {
             watch: watch.iter().map(|&component| Watch { component, depth: None }).collect(),
+            root: false,
             false_reject: 0.01,
             span: Span::default(),
         },
