@@ -96,8 +96,8 @@ fn warnings_are_about_the_cameras_together() {
 #[test]
 fn the_promise_is_of_the_joint_verdict() {
     let promise = &rig().promise;
-    // Six customers with eight goods each beside that for calibration, and two of every fault that any camera shows.
-    assert_eq!(promise.false_reject.trials, 48);
+    // Six customers with six goods each beside that for calibration, and two of every fault that any camera shows.
+    assert_eq!(promise.false_reject.trials, 36);
     assert!(promise.modes.iter().all(|m| m.escape.trials == 12), "{promise:?}");
     let escaped = |component: &str, fault: &str| {
         let of = promise.modes.iter().find(|m| m.component == component && m.fault == fault);

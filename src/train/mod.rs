@@ -43,7 +43,7 @@ use synthesise::{Draws, Shots, synthesise};
 /// Customers imagined for the held-out renders.
 const CUSTOMERS: u64 = 6;
 /// Held-out draws of good assemblies per customer, the first of which calibrates, and of every error mode.
-const HELD_OUT_GOOD: u32 = 9;
+const HELD_OUT_GOOD: u32 = 7;
 const HELD_OUT_FAULTY: u32 = 2;
 /// Bright matt surfaces reach this grey value (share of full scale) under the described lamps.
 const EXPOSED_TO: f64 = 0.6;
