@@ -442,6 +442,19 @@ mod tests {
     use crate::{assembly, design};
     use std::f64::consts::FRAC_PI_2;
 
+    /// The plan of a spec of one station, seen from above.
+    fn planned(text: &str) -> (Design, Camera, Plan) {
+        let loaded = design::load("small.gng", &|_| Ok(text.to_string()), &[]);
+        let design = loaded.design.unwrap_or_else(|| panic!("{:#?}", loaded.diagnostics));
+        let station = &design.stations[0];
+        let nominal = shots::nominal(&design, station).unwrap();
+        let (found, _) = assembly::analyse(&design, &nominal.solids);
+        let modes = assembly::fault::all(&design, &found.liaison, &found.insertion, &nominal.solids);
+        let camera = camera(&station.camera, Placed { distance: 400.0, elevation: 1.4, azimuth: -FRAC_PI_2 });
+        let plan = plan(&design, &camera, &nominal, &found.liaison, &modes);
+        (design, camera, plan)
+    }
+
     /// A lid of 24 mm on a spacer, seen from above. What is changed at the lid's middle belongs to the lid where the spacer shows
     /// beside it; where it is hidden, the lid's coming down is all that tells of it.
     #[test]
@@ -456,14 +469,7 @@ mod tests {
                  station bench {{\n camera fixed {{\n image = 160 x 120 px\n focal = 16\n pitch = 0.03\n distance = 400\n elevation = 80\n}}\n\
                  light room = room()\n}}\ninspect stack {{\n watch spacer\n watch lid\n}}\n"
             );
-            let loaded = design::load("stack.gng", &|_| Ok(text.clone()), &[]);
-            let design = loaded.design.unwrap_or_else(|| panic!("{:#?}", loaded.diagnostics));
-            let station = &design.stations[0];
-            let nominal = shots::nominal(&design, station).unwrap();
-            let (found, _) = assembly::analyse(&design, &nominal.solids);
-            let modes = assembly::fault::all(&design, &found.liaison, &found.insertion, &nominal.solids);
-            let camera = camera(&station.camera, Placed { distance: 400.0, elevation: 1.4, azimuth: -FRAC_PI_2 });
-            let plan = plan(&design, &camera, &nominal, &found.liaison, &modes);
+            let (design, camera, plan) = planned(&text);
             let node = plan.nodes.iter().find(|n| design.components[n.component].name == "spacer").unwrap();
             let middle = camera.reduced(plan.base).project([0.0, 0.0, 15.0]).unwrap().map(|v| v as usize);
             let at = |mask: &Mask| mask.bits[middle[1] * mask.width + middle[0]];
@@ -484,14 +490,7 @@ mod tests {
                  station bench {{\n camera fixed {{\n image = 160 x 120 px\n focal = 16\n pitch = 0.03\n distance = 400\n elevation = 80\n}}\n\
                  light room = room()\n}}\n{inspect}"
             );
-            let loaded = design::load("board.gng", &|_| Ok(text.clone()), &[]);
-            let design = loaded.design.unwrap_or_else(|| panic!("{:#?}", loaded.diagnostics));
-            let station = &design.stations[0];
-            let nominal = shots::nominal(&design, station).unwrap();
-            let (found, _) = assembly::analyse(&design, &nominal.solids);
-            let modes = assembly::fault::all(&design, &found.liaison, &found.insertion, &nominal.solids);
-            let camera = camera(&station.camera, Placed { distance: 400.0, elevation: 1.4, azimuth: -FRAC_PI_2 });
-            plan(&design, &camera, &nominal, &found.liaison, &modes)
+            planned(&text).2
         };
         let plan = plan_of("");
         let [pin, base] = &plan.nodes[..] else { panic!("{} nodes", plan.nodes.len()) };
