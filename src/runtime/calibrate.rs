@@ -222,6 +222,11 @@ fn proves(node: &Node, report: &NodeReport) -> bool {
 
 /// The calibration without the question whether the photos show a fault.
 pub fn fit(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationError> {
+    fit_for(model, model.digest(), photos)
+}
+
+/// The same for who knows the model's digest, or needs none: to reckon it takes longer than all the rest.
+pub(crate) fn fit_for(model: &Model, digest: String, photos: &[Photo]) -> Result<Calibration, CalibrationError> {
     let photos: Vec<Cow<Photo>> = photos.iter().map(|p| p.flattened(model.station.vignetting)).collect();
     let first = photos.first().ok_or(CalibrationError::NoPhoto)?;
     let prepared = Prepared::new(model).ok_or(CalibrationError::Unusable)?;
@@ -248,10 +253,9 @@ pub fn fit(model: &Model, photos: &[Photo]) -> Result<Calibration, CalibrationEr
         Reference::of(&prepared.nodes.iter().map(window).collect::<Vec<_>>())
     };
     let references = photos.iter().zip(&poses).map(reference).collect();
-    let model = model.digest();
     Ok(Calibration {
         format: FORMAT,
-        model,
+        model: digest,
         installation,
         lamps: weights,
         noise,

@@ -97,7 +97,7 @@ impl NodeImages {
     /// no render is expected of every photo of the station, wherever a hypothesis looks like the good state. Also how unlike
     /// the rendered good state they are.
     pub fn densities(&self, light: &Light, noise: f64, references: &[Grid]) -> (Vec<Density>, Vec<Unlikeness>) {
-        let mut densities = self.rendered(light, noise);
+        let mut densities = self.rendered(self.hypotheses.len(), light, noise);
         let level = |window: &Grid| self.stencil.coefficients(&light.level(window.clone(), &self.surroundings));
         let levelled: Vec<Vec<f32>> = references.iter().map(level).collect();
         let unlike = levelled.iter().map(|z| self.unlike(&densities[0].surprise(z))).collect();
@@ -115,8 +115,8 @@ impl NodeImages {
         strange::unlikeness(&self.stencil.widened(&self.stencil.square_means(surprise)))
     }
 
-    /// The densities as renders alone make them.
-    fn rendered(&self, light: &Light, noise: f64) -> Vec<Density> {
+    /// The densities of the first `count` hypotheses as renders alone make them.
+    fn rendered(&self, count: usize, light: &Light, noise: f64) -> Vec<Density> {
         let noise = noise / f64::from(self.window.frame.factor);
         let good = self.lit(0, light);
         let searched = self.glance.as_ref().map(|g| g.cells.clone());
@@ -125,7 +125,7 @@ impl NodeImages {
             let samples = if hypothesis == 0 { good.clone() } else { self.lit(hypothesis, light) };
             Density::fit(&samples, self.lamp_columns(hypothesis, light), &floor)
         };
-        (0..self.hypotheses.len()).map(density).collect()
+        (0..count).map(density).collect()
     }
 
     /// What a drift of the light does to a hypothesis, one column per drift: images are linear in light.
@@ -235,7 +235,7 @@ impl NodeImages {
         camera: &Camera,
         pose: &Pose,
     ) -> (Grid, [f64; 2]) {
-        let good = &self.rendered(light, noise)[0];
+        let good = &self.rendered(1, light, noise)[0];
         let look = self.look(std::slice::from_ref(good), light, reduced, camera, pose, &nobody);
         let window = self.window.cut(&reduced.grid, &self.window.place(camera, pose), look.best_shift());
         (window, look.measured_shift().map(|v| v * f64::from(self.window.frame.factor)))

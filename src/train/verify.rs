@@ -13,7 +13,7 @@ use super::thresholds;
 use crate::assembly::fault::{ErrorMode, Motion};
 use crate::design::model::{Design, Station};
 use crate::rng::Stream;
-use crate::runtime::calibrate::{self, Calibration};
+use crate::runtime::calibrate;
 use crate::runtime::camera::let_through;
 use crate::runtime::grid::Grid;
 use crate::runtime::inspect::{self, Decision, Inspector, Verdict};
@@ -176,7 +176,7 @@ pub fn judge_all(
     held_out: &[(Customer, Shots)],
 ) -> HeldOut {
     let all = |model: &Model| -> (Vec<bool>, Vec<Judged>) {
-        let each: Vec<Option<Judged>> = held_out.iter().map(|(c, shots)| judge(model, plan, c, shots)).collect();
+        let each: Vec<Option<Judged>> = held_out.par_iter().map(|(c, shots)| judge(model, plan, c, shots)).collect();
         (each.iter().map(Option::is_some).collect(), each.into_iter().flatten().collect())
     };
     let (mut fit, mut judged) = all(model);
@@ -203,7 +203,7 @@ pub(super) fn judge(model: &Model, plan: &Plan, customer: &Customer, shots: &Sho
     let (first, rest) = shots.good.split_first()?;
     let customer = customer.expose(first);
     let take = |lamps: &[Grid], index: u64| photo(model, &customer, lamps, plan.base, index);
-    let calibration: Calibration = calibrate::fit(model, &[take(&first.lamps, 0)]).ok()?;
+    let calibration = calibrate::fit_for(model, String::new(), &[take(&first.lamps, 0)]).ok()?;
     let inspector = Inspector::new(model, &calibration)?;
     let good = rest.par_iter().enumerate().map(|(i, s)| inspector.inspect(&take(&s.lamps, 1 + i as u64))).collect();
     let scene = |(scene, taken): (usize, &Vec<FaultyShot>)| {
