@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// The format this version writes, and the only one it reads so far.
-pub const FORMAT: u32 = 6;
+pub const FORMAT: u32 = 7;
 /// Sizes of squares in which a node is held against its good state: the cells of its coarsest level and of the one before.
 pub const SCALES: usize = 3;
 /// Larger files are refused before they are parsed (bytes).
@@ -198,9 +198,9 @@ pub struct Node {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Usual {
-    /// Per square the middle of what held-out good renders show, in steps.
-    pub middle: Row,
-    /// Of the largest excess over that in a good render: its middle, and its standard deviation upwards beyond what the nodes of
+    /// Per square what the second highest of held-out good renders shows, in steps.
+    pub high: Row,
+    /// Of the largest excess over that in a good render, held against the others: its middle, and its standard deviation upwards beyond what the nodes of
     /// a photo have in common (logarithms).
     pub excess: [f64; 2],
 }

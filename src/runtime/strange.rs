@@ -29,7 +29,9 @@ const FAR: f64 = 3.09;
 /// Weight of the middle unlikeness of the photo's other nodes in what one may have.
 const COMMON: f64 = 2.0;
 /// Renders of one node scatter by at least this factor's logarithm: a few dozen do not show all that photos do.
-const LEAST_DEVIATION: f64 = 0.25;
+const LEAST_DEVIATION: f64 = 0.3;
+/// A square may show what so many good photos of it showed.
+const HIGH: usize = 2;
 /// Share of a normal variable below one standard deviation above its mean.
 const ONE_DEVIATION_UP: f64 = 0.84;
 /// What has no logarithm.
@@ -67,52 +69,83 @@ pub fn mean(all: &[Unlikeness]) -> Option<Unlikeness> {
 }
 
 /// Per node and size of squares what good photos show. `photos` holds, per photo, what each node shows and what it showed at
-/// calibration.
-pub fn usual(photos: &[(Vec<Unlikeness>, &[Option<Unlikeness>])]) -> Vec<Vec<Usual>> {
+/// calibration; of good photos a share of `false_reject` may be strange.
+pub fn usual(photos: &[(Vec<Unlikeness>, &[Option<Unlikeness>])], false_reject: f64) -> Vec<Vec<Usual>> {
     let nodes = photos.iter().map(|(unlike, _)| unlike.len()).min().unwrap_or(0);
-    let start = |node: usize, scale: usize| {
-        let middle = middle(&photos.iter().map(|(unlike, _)| &unlike[node][scale]).collect::<Vec<_>>());
-        Usual { middle, excess: [0.0, LEAST_DEVIATION] }
-    };
-    let mut usual: Vec<Vec<Usual>> = (0..nodes).map(|n| (0..SCALES).map(|scale| start(n, scale)).collect()).collect();
+    let mut usual = vec![Vec::new(); nodes];
     for scale in 0..SCALES {
-        for node in 0..nodes {
-            let of = |(unlike, calibrated): &(Vec<Unlikeness>, &[Option<Unlikeness>])| {
-                let before = calibrated.get(node).and_then(Option::as_ref);
-                excess(&unlike[node][scale], &usual[node][scale].middle, before.map(|b| &b[scale])) as f32
+        let highs = |node: usize| Highs::of(&photos.iter().map(|(unlike, _)| &unlike[node][scale]).collect::<Vec<_>>());
+        let highs: Vec<Highs> = (0..nodes).map(highs).collect();
+        let of = |(p, (unlike, calibrated)): (usize, &(Vec<Unlikeness>, &[Option<Unlikeness>]))| -> Vec<f64> {
+            let of = |node: usize| {
+                excess(&unlike[node][scale], &highs[node].without(Some(p)), before(calibrated, node, scale))
             };
-            let mut own: Vec<f32> = photos.iter().map(of).collect();
-            usual[node][scale].excess[0] = f64::from(linear::median(&mut own));
-        }
-        let beyond: Vec<Vec<f64>> =
-            photos.iter().map(|(unlike, calibrated)| beyond(unlike, &usual, calibrated, scale)).collect();
-        for node in 0..nodes {
+            (0..nodes).map(of).collect()
+        };
+        let excesses: Vec<Vec<f64>> = photos.iter().enumerate().map(of).collect();
+        let common = |node: usize| {
+            let mut own: Vec<f32> = excesses.iter().map(|photo| photo[node] as f32).collect();
+            f64::from(linear::median(&mut own))
+        };
+        let common: Vec<f64> = (0..nodes).map(common).collect();
+        let beyond = |photo: &Vec<f64>| beyond(&photo.iter().zip(&common).map(|(e, c)| Some(e - c)).collect::<Vec<_>>());
+        let beyond: Vec<Vec<f64>> = excesses.iter().map(beyond).collect();
+        for (node, usual) in usual.iter_mut().enumerate() {
             let mut own: Vec<f64> = beyond.iter().map(|photo| photo[node]).collect();
             own.sort_by(f64::total_cmp);
-            let high = own[((own.len() - 1) as f64 * ONE_DEVIATION_UP).round() as usize];
-            // Tails may be heavier than a normal variable's: no photo of these is strange.
-            let highest = own[own.len() - 1] / LIMIT;
-            usual[node][scale].excess[1] = high.max(highest).max(LEAST_DEVIATION);
+            let deviation = deviation(&own, false_reject / (nodes * SCALES) as f64);
+            usual.push(Usual { high: highs[node].without(None), excess: [common[node], deviation] });
         }
     }
     usual
 }
 
-/// Per square the median of several photos.
-fn middle(all: &[&Row]) -> Row {
-    let squares = all.iter().map(|row| row.0.len()).min().unwrap_or(0);
-    let square = |k: usize| {
-        let mut codes: Vec<u16> = all.iter().map(|row| row.0[k]).collect();
-        codes.sort_unstable();
-        codes[codes.len() / 2]
-    };
-    Row((0..squares).map(square).collect())
+/// The highest that each square showed in some photos, with the photo.
+struct Highs(Vec<Vec<(u16, usize)>>);
+
+impl Highs {
+    fn of(all: &[&Row]) -> Highs {
+        let squares = all.iter().map(|row| row.0.len()).min().unwrap_or(0);
+        let square = |k: usize| {
+            let mut codes: Vec<(u16, usize)> = all.iter().enumerate().map(|(p, row)| (row.0[k], p)).collect();
+            codes.sort_unstable_by(|a, b| b.cmp(a));
+            codes.truncate(HIGH + 1);
+            codes
+        };
+        Highs((0..squares).map(square).collect())
+    }
+
+    /// Per square what [`HIGH`] photos reach, and not only one that went wrong; a photo that is held against the others is
+    /// none of them.
+    fn without(&self, photo: Option<usize>) -> Row {
+        let of = |codes: &Vec<(u16, usize)>| {
+            let mut others = codes.iter().filter(|(_, p)| Some(*p) != photo).map(|(code, _)| *code);
+            others.by_ref().take(HIGH).last().unwrap_or(0)
+        };
+        Row(self.0.iter().map(of).collect())
+    }
+}
+
+/// The standard deviation by which to measure what lies beyond the usual, from ascending values of good photos. Where these belie
+/// [`LIMIT`], the tail is heavier than a normal variable's, and the next photos will lie further out than the few that are known:
+/// an exponential tail, whose mean excess over one deviation theirs is, then says where a share of `beyond` lies above the limit.
+fn deviation(own: &[f64], beyond: f64) -> f64 {
+    let highest = own[own.len() - 1];
+    let high = own[((own.len() - 1) as f64 * ONE_DEVIATION_UP).round() as usize];
+    let normal = high.max(LEAST_DEVIATION);
+    if highest <= LIMIT * normal {
+        return normal;
+    }
+    let over: Vec<f64> = own.iter().map(|v| v - high).filter(|v| *v > 0.0).collect();
+    let mean = over.iter().sum::<f64>() / over.len() as f64;
+    let limit = high + mean * math::ln((1.0 - ONE_DEVIATION_UP) / beyond).max(0.0);
+    limit.max(highest) / LIMIT
 }
 
 /// By how much the logarithm of what a square shows exceeds what it usually shows, or what it showed at calibration, where it
 /// does so most; 0 where no square is unlike.
-fn excess(unlike: &Row, middle: &Row, calibrated: Option<&Row>) -> f64 {
-    let squares = unlike.0.iter().zip(&middle.0).enumerate();
+fn excess(unlike: &Row, high: &Row, calibrated: Option<&Row>) -> f64 {
+    let squares = unlike.0.iter().zip(&high.0).enumerate();
     let of = |(k, (&shown, &usual)): (usize, (&u16, &u16))| {
         let shown = log(shown).filter(|shown| *shown >= math::ln(LEAST))?;
         let before = calibrated.and_then(|row| log(*row.0.get(k)?));
@@ -121,22 +154,30 @@ fn excess(unlike: &Row, middle: &Row, calibrated: Option<&Row>) -> f64 {
     squares.filter_map(of).fold(0.0, f64::max)
 }
 
+/// What a node showed at calibration.
+fn before(calibrated: &[Option<Unlikeness>], node: usize, scale: usize) -> Option<&Row> {
+    calibrated.get(node).and_then(Option::as_ref).map(|before| &before[scale])
+}
+
 /// By how much each node's excess is more than usual, and than the middle of what the photo's other nodes have more than
-/// theirs. 0 where nothing is known of the node.
-fn beyond(unlike: &[Unlikeness], usual: &[Vec<Usual>], calibrated: &[Option<Unlikeness>], scale: usize) -> Vec<f64> {
-    let more = |(i, unlike): (usize, &Unlikeness)| {
-        let usual = usual.get(i)?.get(scale)?;
-        let before = calibrated.get(i).and_then(Option::as_ref).map(|before| &before[scale]);
-        Some(excess(&unlike[scale], &usual.middle, before) - usual.excess[0])
-    };
-    let all: Vec<Option<f64>> = unlike.iter().enumerate().map(more).collect();
+/// theirs. `more` holds the former, `None` where nothing is known of the node; it has 0.
+fn beyond(more: &[Option<f64>]) -> Vec<f64> {
     let of = |i: usize| -> Option<f64> {
         let mut others: Vec<f32> =
-            (0..all.len()).filter(|&k| k != i).filter_map(|k| all[k]).map(|e| e as f32).collect();
+            (0..more.len()).filter(|&k| k != i).filter_map(|k| more[k]).map(|e| e as f32).collect();
         let common = if others.is_empty() { 0.0 } else { f64::from(linear::median(&mut others)) };
-        Some(all[i]? - common.max(0.0))
+        Some(more[i]? - common.max(0.0))
     };
-    (0..all.len()).map(|i| of(i).unwrap_or(0.0)).collect()
+    (0..more.len()).map(|i| of(i).unwrap_or(0.0)).collect()
+}
+
+/// By how much the nodes' excesses are more than usual.
+fn more(unlike: &[Unlikeness], usual: &[Vec<Usual>], calibrated: &[Option<Unlikeness>], scale: usize) -> Vec<Option<f64>> {
+    let more = |(i, unlike): (usize, &Unlikeness)| {
+        let usual = usual.get(i)?.get(scale)?;
+        Some(excess(&unlike[scale], &usual.high, before(calibrated, i, scale)) - usual.excess[0])
+    };
+    unlike.iter().enumerate().map(more).collect()
 }
 
 /// Writes every node's strangeness: standard deviations beyond what it may show. `calibrated` holds what each node showed in the
@@ -146,7 +187,7 @@ pub fn weigh(nodes: &mut [NodeReport], of: &[Node], calibrated: &[Option<Unliken
     let usual: Vec<Vec<Usual>> = of.iter().map(|n| n.usual.clone()).collect();
     nodes.iter_mut().for_each(|n| n.strangeness = 0.0);
     for scale in 0..SCALES {
-        let beyond = beyond(&unlike, &usual, calibrated, scale);
+        let beyond = beyond(&more(&unlike, &usual, calibrated, scale));
         for i in (0..nodes.len()).filter(|&i| usual[i].len() > scale) {
             let deviation = usual[i][scale].excess[1] * of_middle(nodes.len());
             nodes[i].strangeness = nodes[i].strangeness.max(beyond[i] / deviation);
@@ -193,14 +234,14 @@ mod tests {
     }
 
     fn usual_nodes(count: usize) -> Vec<Vec<Usual>> {
-        let middle = node(1.0, 1.0);
-        let of = |scale: usize| Usual { middle: middle[scale].clone(), excess: [0.3, 0.25] };
+        let high = node(1.0, 1.0);
+        let of = |scale: usize| Usual { high: high[scale].clone(), excess: [0.3, 0.25] };
         (0..count).map(|_| (0..SCALES).map(of).collect()).collect()
     }
 
     fn strangeness(photo: &[Unlikeness], calibrated: &[Unlikeness]) -> Vec<f64> {
         let calibrated: Vec<Option<Unlikeness>> = calibrated.iter().cloned().map(Some).collect();
-        beyond(photo, &usual_nodes(photo.len()), &calibrated, 0).into_iter().map(|b| b / 0.25).collect()
+        beyond(&more(photo, &usual_nodes(photo.len()), &calibrated, 0)).into_iter().map(|b| b / 0.25).collect()
     }
 
     fn nodes(count: usize, other: usize, unlike: Unlikeness) -> Vec<Unlikeness> {
@@ -241,7 +282,7 @@ mod tests {
     #[test]
     fn a_lone_node_is_held_against_what_it_usually_shows() {
         assert!(strangeness(&[node(1.0, 8.0)], &[node(1.0, 1.0)])[0] > LIMIT);
-        assert_eq!(beyond(&[node(1.0, 8.0)], &[], &[], 0), [0.0], "nothing is known of it");
+        assert_eq!(beyond(&more(&[node(1.0, 8.0)], &[], &[], 0)), [0.0], "nothing is known of it");
     }
 
     #[test]
@@ -253,6 +294,21 @@ mod tests {
         assert_eq!(mean(&[node(1.0, 1.0), node(1.0, 1.0)]), Some(node(1.0, 1.0)));
     }
 
+    /// 36 good photos of normal scatter, then with one that lies beyond five deviations: its excess of 1.5 is one of six over the
+    /// 84th percentile, so the mean excess is about 0.31, and one in 36 000 lies ln(0.16 · 36 000) = 8.7 times that beyond it.
+    #[test]
+    fn a_photo_beyond_the_limit_says_that_others_will_lie_further_out() {
+        let mut own: Vec<f64> = (0..36).map(|i| f64::from(i) / 35.0 * 0.4 - 0.2).collect();
+        assert_eq!(deviation(&own, 1e-3 / 36.0), LEAST_DEVIATION);
+        own[35] = 1.6;
+        let (high, over) = (own[29], [own[30], own[31], own[32], own[33], own[34], own[35]].map(|v| v - own[29]));
+        let mean = over.iter().sum::<f64>() / 6.0;
+        let limit = high + mean * (0.16f64 * 36e3).ln();
+        let found = deviation(&own, 1e-3 / 36.0) * LIMIT;
+        assert!((found - limit).abs() < 1e-9 && found > 1.4 * 1.6, "{found} {limit}");
+        assert!(deviation(&own, 0.9) * LIMIT >= 1.6, "no photo of these is strange");
+    }
+
     /// Of good photos none is strange; each square is held against its own middle, the rest is scatter.
     #[test]
     fn no_good_photo_is_strange_by_what_is_learnt_of_them() {
@@ -262,10 +318,10 @@ mod tests {
             (0..6).map(|n| unlikeness(&std::array::from_fn(|_| (0..3).map(|k| square(p, n, k)).collect()))).collect()
         };
         let photos: Vec<(Vec<Unlikeness>, &[Option<Unlikeness>])> = (0..30).map(|p| (unlike(p), &[][..])).collect();
-        let learnt = usual(&photos);
+        let learnt = usual(&photos, 1e-3);
         for (photo, calibrated) in &photos {
             for scale in 0..SCALES {
-                for (beyond, of) in beyond(photo, &learnt, calibrated, scale).iter().zip(&learnt) {
+                for (beyond, of) in beyond(&more(photo, &learnt, calibrated, scale)).iter().zip(&learnt) {
                     assert!(beyond / of[scale].excess[1] <= LIMIT + 1e-9);
                     assert!(of[scale].excess[1] < 0.5, "squares of unlike height are no scatter: {of:?}");
                 }

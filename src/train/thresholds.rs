@@ -61,11 +61,11 @@ fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
     out
 }
 
-/// The log-likelihood ratio below which a node counts as faulty in one way. Where good and faulty renders lie apart but below
-/// zero, the middle between them decides. Else its sign does, less what the promised rate of false rejects takes: of good
-/// renders a share `p0` falls below zero, and from there on likelihood ratios fall off as their own size says (a ratio of Λ is
-/// at most 1 / Λ as likely, Markov's inequality). Where the bulks overlap, that of the goods reaches below zero or less than half of
-/// the faulty renders are found, ratios are not what they say, and the spread of the goods may take more.
+/// The log-likelihood ratio below which a node counts as faulty in one way. Its sign decides, less what the promised rate of false
+/// rejects takes: of good renders a share `p0` falls below zero, and from there on likelihood ratios fall off as their own size
+/// says (a ratio of Λ is at most 1 / Λ as likely, Markov's inequality). Where the bulk of the goods reaches below zero, or it overlaps
+/// with that of the faulty ones and less than half of these are found, ratios are not what they say, and the spread of the goods may
+/// take more.
 /// Ratios are natural logarithms, a ratio of 1 being that of `independent` coefficients' worth.
 /// What then finds less than a quarter of the faulty renders that show most is kept far from the goods.
 /// Never a quantile of the goods: their few lowest scores say nothing about a photo's.
@@ -74,15 +74,11 @@ pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independ
         return 0.0;
     }
     let (lowest, highest) = (at_share(good, TRIM), at_share(fault, 1.0 - TRIM));
-    let apart = lowest > highest;
-    if apart && lowest <= 0.0 {
-        return (lowest + highest) / 2.0;
-    }
     let middle = at_share(good, 0.5);
     let below_zero = below_zero(middle, middle - at_share(good, ONE_DEVIATION_DOWN));
     let by_ratio = -(below_zero / false_reject).ln().max(0.0) / independent;
     let found = fault.iter().filter(|f| **f < by_ratio).count();
-    if apart || (lowest > 0.0 && 2 * found >= fault.len()) {
+    if lowest > 0.0 && (lowest > highest || 2 * found >= fault.len()) {
         return by_ratio;
     }
     let mut distances: Vec<f64> = good.iter().map(|g| (g - middle).abs()).collect();
@@ -187,9 +183,15 @@ mod tests {
         assert!(limits[1] < -0.2 && limits[2] > -0.1, "{limits:?}");
     }
 
+    /// A gap between good and faulty renders, however clear, says nothing of the next good one where the ratio has no meaning: only
+    /// their spread does.
     #[test]
-    fn the_middle_decides_where_they_lie_apart_below_zero() {
-        assert!((threshold(&[-0.2, -0.1, 0.0], &[-0.8, -0.7, -0.6], 1e-3, INDEPENDENT) + 0.4).abs() < 1e-9);
+    fn a_gap_below_zero_is_no_promise() {
+        let good = [-0.05, -0.04, -0.03, -0.01, 0.0, 0.05, 0.1, 0.15, 0.2, 0.25];
+        let limit = threshold(&good, &[-0.09, -0.08, -0.08, -0.07, -0.06, -0.06], 1e-3, INDEPENDENT);
+        assert!(limit < -0.3, "{limit}");
+        let far = threshold(&[-0.2, -0.1, 0.0], &[-0.8, -0.7, -0.6], 1e-3, INDEPENDENT);
+        assert!((far - (-0.1 - 3.0902 * 0.1 / 0.6745)).abs() < 1e-3, "{far}");
         assert_eq!(threshold(&[0.3, 0.4], &[0.1, 0.2], 1e-3, INDEPENDENT), 0.0);
     }
 

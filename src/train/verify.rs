@@ -192,7 +192,7 @@ pub fn settle(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: 
     let HeldOut { judged, unfit, .. } = held_out;
     set_rises(model, design, scenes, modes, judged);
     set_thresholds(model, design, scenes, modes, judged);
-    set_usual(model, judged);
+    set_usual(model, design.inspect.false_reject, judged);
     model.locator.accept = accept(judged, model.locator.unsigned);
     model.station.least_correlation = least_correlation(judged);
     model.promise = promise(model, design, scenes, modes, judged, *unfit);
@@ -279,14 +279,14 @@ fn set_thresholds(model: &mut Model, design: &Design, scenes: &[Vec<usize>], mod
 }
 
 /// What the nodes of correct assemblies show of what their model does not know.
-fn set_usual(model: &mut Model, judged: &[Judged]) {
+fn set_usual(model: &mut Model, false_reject: f64, judged: &[Judged]) {
     let mut photos: Vec<(Vec<Unlikeness>, &[Option<Unlikeness>])> = Vec::new();
     for j in judged {
         for verdict in j.good.iter().filter(|v| v.nodes.len() == model.nodes.len()) {
             photos.push((verdict.nodes.iter().map(|n| n.unlike.clone()).collect(), &j.calibrated));
         }
     }
-    for (node, usual) in model.nodes.iter_mut().zip(strange::usual(&photos)) {
+    for (node, usual) in model.nodes.iter_mut().zip(strange::usual(&photos, false_reject)) {
         node.usual = usual.into_iter().map(|of| Usual { excess: of.excess.map(rounded), ..of }).collect();
     }
 }
