@@ -167,7 +167,7 @@ fn a_reader_written_from_the_page_reads_what_the_library_reads() {
     assert_eq!(tables.keys().map(String::as_str).collect::<Vec<_>>(), known);
 
     // And a reader from the page refuses what the library refuses.
-    for broken in [text.replacen("format: 6", "format: 7", 1), text.replacen("seed: 7", "seed: 8", 1)] {
+    for broken in [text.replacen("format: 7", "format: 8", 1), text.replacen("seed: 7", "seed: 8", 1)] {
         assert!(read(&broken, "Model", &tables).is_err() && Model::read(&broken).is_err());
     }
 }

@@ -224,7 +224,7 @@ fn what_does_not_fit_together_is_refused() {
     let refused = |text: &str| Rig::read(text).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(refused(&text.replacen("two_views", "two_lies!", 1)).starts_with("E0802: "));
     assert!(refused(&text[..text.len() / 2]).starts_with("E0802: "));
-    assert!(refused(&text.replacen("format: 6", "format: 7", 1)).starts_with("E0801: "));
+    assert!(refused(&text.replacen("format: 7", "format: 8", 1)).starts_with("E0801: "));
 }
 
 #[test]

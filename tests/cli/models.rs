@@ -25,7 +25,7 @@ fn an_edited_model_is_refused() {
 
 #[test]
 fn a_model_of_a_newer_format_says_which() {
-    model_refused("newer", |text| text.replacen("format: 6", "format: 99", 1), &["E0801", "format 99"]);
+    model_refused("newer", |text| text.replacen("format: 7", "format: 99", 1), &["E0801", "format 99"]);
 }
 
 #[test]

@@ -82,10 +82,10 @@ fn every_cut_and_every_edit_is_noticed() {
 
 #[test]
 fn other_formats_are_named() {
-    let newer = tiny().write().replacen("format: 6", "format: 9", 1);
+    let newer = tiny().write().replacen("format: 7", "format: 9", 1);
     assert_eq!(Model::read(&newer), Err(ModelError::Newer { format: 9 }));
     assert!(Model::read(&newer).unwrap_err().to_string().contains("E0801"));
-    let older = tiny().write().replacen("format: 6", "format: 0", 1);
+    let older = tiny().write().replacen("format: 7", "format: 0", 1);
     assert_eq!(Model::read(&older), Err(ModelError::Older { format: 0 }));
 }
 
