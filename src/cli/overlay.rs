@@ -160,6 +160,7 @@ mod tests {
             unlike: Default::default(),
             strangeness: 0.0,
             lift: None,
+            beyond: 0.0,
             faulty,
             explained: false,
         }

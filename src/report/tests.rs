@@ -65,6 +65,7 @@ fn verdict() -> Verdict {
         unlike: Default::default(),
         strangeness: 0.0,
         lift: None,
+        beyond: 0.0,
         faulty: true,
         explained: false,
     };

@@ -7,10 +7,11 @@
 use super::calibrate::{Calibration, widened};
 use super::camera::Camera;
 use super::density::Density;
-use super::judge::{Evidence, NodeImages, Prepared, Pyramid};
+use super::judge::{Evidence, INDEPENDENT, NodeImages, Prepared, Pyramid};
 use super::light::Light;
 use super::locate::{Located, Search};
 use super::look::Look;
+use super::math;
 use super::model::{Model, Node};
 use super::parts::{Listener, Part, nobody};
 use super::photo::{Photo, PhotoError};
@@ -23,6 +24,8 @@ use std::borrow::Cow;
 
 /// A node of which less is inside the photo cannot be judged.
 pub(super) const LEAST_INSIDE: f64 = 0.6;
+/// The fault of a part that is found beside its place.
+pub const MISPLACED: &str = "misplaced";
 /// Below this share of the calibration's score the assembly counts as not found.
 const LEAST_SCORE: f64 = 0.5;
 
@@ -76,6 +79,8 @@ pub struct NodeReport {
     pub strangeness: f64,
     /// How high the component appears to stand above its place, where that can be told.
     pub lift: Option<Lift>,
+    /// By how much the good state fits better beyond where it is looked for: log-likelihood ratio per coefficient.
+    pub beyond: f64,
     pub faulty: bool,
     /// Faulty by itself, but explained by another component's fault.
     pub explained: bool,
@@ -225,8 +230,8 @@ impl<'a> Inspector<'a> {
         let mut findings: Vec<Finding> = order.iter().map(|&i| self.finding(i, &nodes[i])).collect();
         let hidden = nodes.iter().find(|n| n.inside < LEAST_INSIDE);
         if findings.is_empty() && hidden.is_none() {
-            let unknown = |i: usize| Finding { fault: strange::UNKNOWN.into(), ..self.finding(i, &nodes[i]) };
-            findings.extend(strange::strangest(&nodes).map(unknown));
+            let of = |(i, fault): (usize, &str)| Finding { fault: fault.into(), ..self.finding(i, &nodes[i]) };
+            findings.extend(beside(&self.model, &nodes).map(of));
         }
         let (decision, reason) = match (&findings[..], hidden) {
             ([], None) => (Decision::Go, String::new()),
@@ -314,6 +319,7 @@ impl<'a> Inspector<'a> {
             unlike: evidence.unlike.clone(),
             strangeness: 0.0,
             lift: evidence.lift,
+            beyond: evidence.beyond / self.coefficients(index).max(1) as f64,
             // What is no number is no proof of anything.
             faulty: score.is_nan() || score < 0.0,
             explained: false,
@@ -417,6 +423,21 @@ fn expected(model: &Model, calibration: &Calibration) -> Option<Vec<Expected>> {
     (!calibration.references.is_empty()).then(|| model.nodes.iter().enumerate().map(after).collect())
 }
 
+/// What is wrong although no node's error mode shows: a part looks as it should beside its place, or like nothing the model knows.
+pub fn beside(model: &Model, nodes: &[NodeReport]) -> Option<(usize, &'static str)> {
+    elsewhere(model, nodes).map(|i| (i, MISPLACED)).or_else(|| strange::strangest(nodes).map(|i| (i, strange::UNKNOWN)))
+}
+
+/// The node that most surely looks as it should, but beyond the reach of its search. Of renders of correct assemblies none does, so
+/// nothing is learnt from them: a likelihood ratio of Λ is at most 1 / Λ as likely, and that holds here for its square root.
+fn elsewhere(model: &Model, nodes: &[NodeReport]) -> Option<usize> {
+    let asked = model.promise.false_reject_asked / nodes.len().max(1) as f64;
+    let limit = -2.0 * math::ln(asked) / INDEPENDENT;
+    // The root is where the assembly is.
+    let own = |i: &usize| model.nodes[*i].hypotheses.len() > 1 && nodes[*i].beyond > limit;
+    (0..nodes.len()).filter(own).max_by(|&a, &b| nodes[a].beyond.total_cmp(&nodes[b].beyond))
+}
+
 /// The light of a station whose lamps were calibrated to these weights.
 pub fn light(model: &Model, weights: &[f64]) -> Light {
     Light::new(weights, &model.station.lamps)
@@ -462,5 +483,39 @@ fn not_found(found: Option<Located>, least: f64) -> Verdict {
         findings: Vec::new(),
         nodes: Vec::new(),
         outline: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::runtime::model::tests::tiny;
+
+    /// One of a hundred good photos may be rejected: for a lone node the square root of the ratio must be a hundred, 2 ln 100 = 9.2
+    /// in a hundred independent coefficients.
+    #[test]
+    fn what_looks_right_beside_its_place_is_misplaced() {
+        let mut model = tiny();
+        let report = |beyond: f64| NodeReport {
+            name: "pin".into(),
+            level: 1,
+            parent: None,
+            outline: [[0.0; 2]; 4],
+            score: 0.1,
+            against: vec![0.0, 0.1],
+            best_fault: "missing".into(),
+            inside: 1.0,
+            unlike: Unlikeness::default(),
+            strangeness: 9.0,
+            lift: None,
+            beyond,
+            faulty: false,
+            explained: false,
+        };
+        assert_eq!(beside(&model, &[report(0.093)]), Some((0, MISPLACED)));
+        assert_eq!(beside(&model, &[report(0.091)]), Some((0, strange::UNKNOWN)));
+        assert_eq!(beside(&model, &[NodeReport { strangeness: 1.0, ..report(0.0) }]), None);
+        model.nodes[0].hypotheses.truncate(1);
+        assert_eq!(beside(&model, &[report(0.5)]), Some((0, strange::UNKNOWN)), "the root is where the assembly is");
     }
 }

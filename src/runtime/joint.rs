@@ -287,6 +287,7 @@ impl<'a> RigInspector<'a> {
                 unlike: Default::default(),
                 strangeness: nodes().map(|n| n.strangeness).fold(0.0, f64::max),
                 lift: None,
+                beyond: 0.0,
                 faulty: weighed.is_faulty(),
                 explained: weighed.is_faulty() && !blamed.contains(&i),
             }

@@ -153,6 +153,8 @@ pub struct Evidence {
     pub shift: [f64; 2],
     /// How high the part appears to stand; `None` before calibration, and where that cannot be told.
     pub lift: Option<Lift>,
+    /// By how much the good state fits better beyond the reach of the search (log-likelihood).
+    pub beyond: f64,
     /// How far from the first density the node is, square by square: mean of [`Density::surprise`].
     pub unlike: Unlikeness,
 }
@@ -211,7 +213,7 @@ impl NodeImages {
         (look.listener)(Part::Unknown);
         let unlike = strange::unlikeness(&self.stencil.square_means(&look.densities[0].surprise(coefficients)));
         let log_likelihoods = std::iter::once(good.0).chain(others).collect();
-        Evidence { log_likelihoods, inside: look.inside, shift, lift: None, unlike }
+        Evidence { log_likelihoods, inside: look.inside, shift, lift: None, beyond: look.beyond(), unlike }
     }
 
     /// The shift (node px) at which a density fits best.

@@ -19,6 +19,13 @@ const FEW: f64 = 2.0;
 /// Shifts that Gaussian noise likes best, among which Student's decides.
 const SHORT_LIST: usize = 4;
 
+/// A best shift nearer than this to where the search ends (px of the photo) lies at its edge.
+const EDGE: f64 = 0.75;
+/// A part is not looked for further from its place (px of the photo).
+const FARTHEST: f64 = 16.0;
+/// What lies beside a shift.
+const WAYS: [[i32; 2]; 8] = [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]];
+
 /// A node at one shift (node px).
 struct Shifted {
     shift: [f64; 2],
@@ -102,8 +109,7 @@ impl<'a> Look<'a> {
         let fit = |&(i, fit): &(usize, f64)| fit + self.prior(i, &free);
         let best = self.fits[density].iter().max_by(|a, b| fit(a).total_cmp(&fit(b)));
         let [x, y] = best.map_or([0, 0], |b| self.shifted[b.0].shift.map(|v| (v * self.factor * 2.0).round() as i32));
-        let ways = [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]];
-        ways.into_iter().map(|[dx, dy]| [x + dx, y + dy]).collect()
+        WAYS.into_iter().map(|[dx, dy]| [x + dx, y + dy]).collect()
     }
 
     fn free(&self) -> Expected {
@@ -155,6 +161,38 @@ impl<'a> Look<'a> {
             (self.listener)(Part::Windows);
             self.sight.all(shifted.shift)
         })
+    }
+
+    /// By how much the first density fits better beyond the reach of the search (log-likelihood): what fits best at the edge of
+    /// the search and ever better from there on lies beyond it. 0 where it fits best within.
+    pub(super) fn beyond(&self) -> f64 {
+        let start = self.best_shift().map(|v| v * self.factor);
+        if [0, 1].iter().all(|&k| start[k].abs() + EDGE < reach(self.spread[k])) {
+            return 0.0;
+        }
+        (self.listener)(Part::Shifts);
+        let density = &self.densities[0];
+        let at = |place: [f64; 2]| place.map(|v| v / self.factor);
+        let fit = |place: [f64; 2]| match self.sight.some(at(place)) {
+            Some(asked) => density.searched(&asked),
+            None => density.searched(&self.sight.all(at(place))),
+        };
+        let step = (self.factor / 2.0).max(1.0);
+        let (mut place, mut value) = (start, fit(start));
+        loop {
+            let round = WAYS.map(|way| [0, 1].map(|k| place[k] + step * f64::from(way[k])));
+            let inside = round.into_iter().filter(|p| p.iter().all(|v| v.abs() <= FARTHEST));
+            let Some((next, better)) = inside.map(|p| (p, fit(p))).max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+            if better <= value {
+                break;
+            }
+            (place, value) = (next, better);
+        }
+        if place == start {
+            return 0.0;
+        }
+        let student = |place| density.student(&self.sight.all(at(place)));
+        (student(place) - student(start)).max(0.0)
     }
 
     /// A shift in node px.
@@ -220,7 +258,48 @@ fn steps(spread: f64, factor: f64) -> Vec<i32> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::camera::Camera;
+    use super::super::density::{Floor, mean_of};
+    use super::super::grid::Grid;
+    use super::super::light::Light;
+    use super::super::model::Lamp;
+    use super::super::parts::nobody;
+    use super::super::pose::Pose;
+    use super::super::sight::Reduced;
+    use super::super::window::{Frame, Stencil, Window};
     use super::*;
+
+    /// A blob that the model expects in the middle of its window, in photos that show it there, within reach, and 6 px further.
+    #[test]
+    fn what_lies_beyond_the_search_fits_better_there() {
+        let size = 120;
+        let camera = Camera::look_at([0.0, 0.0, 300.0], [0.0; 3], 600.0, [size as u32; 2]);
+        let home = Pose { x: 0.0, y: 0.0, z: 0.0, rz: 0.0 };
+        let frame = Frame { plane: 0.0, factor: 1, origin: [40, 40], size: [40, 40] };
+        let window = Window::new(frame, &camera, &home).unwrap();
+        let stencil = Stencil::new(&vec![vec![true; 40]; 40], 4);
+        let photo = |at: [f64; 2], bright: f64| {
+            let value = |i: usize| {
+                let [x, y] = [(i % size) as f64 - 60.0 - at[0], (i / size) as f64 - 60.0 - at[1]];
+                (0.3 + bright * (-(x * x + y * y) / 60.0).exp()) as f32
+            };
+            Reduced::new(Grid::new(size, size, (0..size * size).map(value).collect()))
+        };
+        let lamp = Lamp { name: "l".into(), light: 0, power: 1.0, drift: 0.1 };
+        let light = Light::new(&[1.0], &[lamp]);
+        let of = |reduced| Sight::new((&window, &stencil, None), (&light, &[]), reduced, (&camera, &home));
+        let samples: Vec<Vec<f32>> =
+            [0.36, 0.4, 0.42, 0.44].map(|bright| of(&photo([0.0; 2], bright)).all([0.0; 2])).into();
+        let floor = Floor::new(&stencil.levels, 0.005, &mean_of(&samples), None);
+        let densities = [Density::fit(&samples, Vec::new(), &floor)];
+        let beyond = |at: [f64; 2]| {
+            let reduced = photo(at, 0.4);
+            Look::new(&densities, [0.7; 2], of(&reduced), &nobody).beyond()
+        };
+        assert_eq!(beyond([0.0, 0.0]), 0.0);
+        assert_eq!(beyond([1.0, -1.0]), 0.0, "within the search");
+        assert!(beyond([6.0, 0.0]) > 100.0 && beyond([-4.0, 5.0]) > 100.0, "{} {}", beyond([6.0, 0.0]), beyond([-4.0, 5.0]));
+    }
 
     #[test]
     fn a_parabola_has_its_top_where_it_was_drawn() {

@@ -190,6 +190,7 @@ pub fn judge_all(
 /// Writes thresholds and promise into the model.
 pub fn settle(model: &mut Model, design: &Design, scenes: &[Vec<usize>], modes: &[ErrorMode], held_out: &HeldOut) {
     let HeldOut { judged, unfit, .. } = held_out;
+    model.promise.false_reject_asked = design.inspect.false_reject;
     set_rises(model, design, scenes, modes, judged);
     set_thresholds(model, design, scenes, modes, judged);
     set_usual(model, design.inspect.false_reject, judged);
@@ -339,15 +340,15 @@ pub(super) fn promise(
         let (of, seen) = (&model.nodes[node], &v.nodes[node]);
         inspect::score(of, &rise::weighed(of, &seen.against, seen.lift)).1 < 0.0
     };
-    let unknown = |j: &Judged, v: &Verdict| {
+    let beside = |j: &Judged, v: &Verdict| {
         let mut nodes = v.nodes.clone();
         strange::weigh(&mut nodes, &model.nodes, &j.calibrated);
-        strange::strangest(&nodes)
+        inspect::beside(model, &nodes).map(|(node, _)| node)
     };
     // Neither does a photo that cannot be judged pass.
     let unsure = |v: &Verdict| v.decision == Decision::CannotInspect;
     let rejected =
-        |(j, v): &(&Judged, &Verdict)| unsure(v) || (0..v.nodes.len()).any(|n| faulty(v, n)) || unknown(j, v).is_some();
+        |(j, v): &(&Judged, &Verdict)| unsure(v) || (0..v.nodes.len()).any(|n| faulty(v, n)) || beside(j, v).is_some();
     let goods: Vec<(&Judged, &Verdict)> = judged.iter().flat_map(|j| j.good.iter().map(move |v| (j, v))).collect();
     let false_rejects = goods.iter().filter(|of| rejected(of)).count() + unfit;
     let mut rates = Vec::new();
@@ -359,7 +360,7 @@ pub(super) fn promise(
             let verdicts: Vec<(&Judged, &Verdict)> =
                 judged.iter().flat_map(|j| j.faulty[scene].iter().map(move |v| (j, v))).collect();
             // A photo in which the assembly is not found is not passed: it does not escape.
-            let passed = |(j, v): &&(&Judged, &Verdict)| !unsure(v) && !faulty(v, node) && unknown(j, v) != Some(node);
+            let passed = |(j, v): &&(&Judged, &Verdict)| !unsure(v) && !faulty(v, node) && beside(j, v) != Some(node);
             let escaped = verdicts.iter().filter(passed).count() as u32;
             escapes += escaped;
             trials += verdicts.len() as u32;

@@ -56,6 +56,7 @@ fn in_full_the_line_goes_on_with_boxes_and_scores() {
         unlike: Default::default(),
         strangeness: 0.0,
         lift: None,
+        beyond: 0.0,
         faulty: true,
         explained: false,
     });
