@@ -287,18 +287,26 @@ mod tests {
         };
         let lamp = Lamp { name: "l".into(), light: 0, power: 1.0, drift: 0.1 };
         let light = Light::new(&[1.0], &[lamp]);
-        let of = |reduced| Sight::new((&window, &stencil, None), (&light, &[]), reduced, (&camera, &home));
-        let samples: Vec<Vec<f32>> =
-            [0.36, 0.4, 0.42, 0.44].map(|bright| of(&photo([0.0; 2], bright)).all([0.0; 2])).into();
+        let in_place = [0.36, 0.4, 0.42, 0.44].map(|bright| photo([0.0; 2], bright));
+        let sample = |reduced: &Reduced| {
+            stencil.coefficients(&window.cut(&reduced.grid, &window.place(&camera, &home), [0.0; 2]))
+        };
+        let samples: Vec<Vec<f32>> = in_place.iter().map(sample).collect();
         let floor = Floor::new(&stencil.levels, 0.005, &mean_of(&samples), None);
         let densities = [Density::fit(&samples, Vec::new(), &floor)];
         let beyond = |at: [f64; 2]| {
             let reduced = photo(at, 0.4);
-            Look::new(&densities, [0.7; 2], of(&reduced), &nobody).beyond()
+            let sight = Sight::new((&window, &stencil, None), (&light, &[]), &reduced, (&camera, &home));
+            Look::new(&densities, [0.7; 2], sight, &nobody).beyond()
         };
         assert_eq!(beyond([0.0, 0.0]), 0.0);
         assert_eq!(beyond([1.0, -1.0]), 0.0, "within the search");
-        assert!(beyond([6.0, 0.0]) > 100.0 && beyond([-4.0, 5.0]) > 100.0, "{} {}", beyond([6.0, 0.0]), beyond([-4.0, 5.0]));
+        assert!(
+            beyond([6.0, 0.0]) > 100.0 && beyond([-4.0, 5.0]) > 100.0,
+            "{} {}",
+            beyond([6.0, 0.0]),
+            beyond([-4.0, 5.0])
+        );
     }
 
     #[test]

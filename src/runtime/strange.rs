@@ -88,7 +88,8 @@ pub fn usual(photos: &[(Vec<Unlikeness>, &[Option<Unlikeness>])], false_reject: 
             f64::from(linear::median(&mut own))
         };
         let common: Vec<f64> = (0..nodes).map(common).collect();
-        let beyond = |photo: &Vec<f64>| beyond(&photo.iter().zip(&common).map(|(e, c)| Some(e - c)).collect::<Vec<_>>());
+        let beyond =
+            |photo: &Vec<f64>| beyond(&photo.iter().zip(&common).map(|(e, c)| Some(e - c)).collect::<Vec<_>>());
         let beyond: Vec<Vec<f64>> = excesses.iter().map(beyond).collect();
         for (node, usual) in usual.iter_mut().enumerate() {
             let mut own: Vec<f64> = beyond.iter().map(|photo| photo[node]).collect();
@@ -172,7 +173,12 @@ fn beyond(more: &[Option<f64>]) -> Vec<f64> {
 }
 
 /// By how much the nodes' excesses are more than usual.
-fn more(unlike: &[Unlikeness], usual: &[Vec<Usual>], calibrated: &[Option<Unlikeness>], scale: usize) -> Vec<Option<f64>> {
+fn more(
+    unlike: &[Unlikeness],
+    usual: &[Vec<Usual>],
+    calibrated: &[Option<Unlikeness>],
+    scale: usize,
+) -> Vec<Option<f64>> {
     let more = |(i, unlike): (usize, &Unlikeness)| {
         let usual = usual.get(i)?.get(scale)?;
         Some(excess(&unlike[scale], &usual.high, before(calibrated, i, scale)) - usual.excess[0])
