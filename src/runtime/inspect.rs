@@ -17,7 +17,7 @@ use super::parts::{Listener, Part, nobody};
 use super::photo::{Photo, PhotoError};
 use super::pose::Pose;
 use super::rise::{self, Lift};
-use super::settle::{self, Expected};
+use super::settle::{self, Expected, LEAST_OTHERS};
 use super::strange::{self, Unlikeness};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -429,8 +429,13 @@ pub fn beside(model: &Model, nodes: &[NodeReport]) -> Option<(usize, &'static st
 }
 
 /// The node that most surely looks as it should, but beyond the reach of its search. Of renders of correct assemblies none does, so
-/// nothing is learnt from them: a likelihood ratio of Λ is at most 1 / Λ as likely, and that holds here for its square root.
+/// nothing is learnt from them: a likelihood ratio of Λ is at most 1 / Λ as likely, and that holds here for its square root. Where
+/// many nodes do, or there are few, it may be the pose that is wrong.
 fn elsewhere(model: &Model, nodes: &[NodeReport]) -> Option<usize> {
+    let together = nodes.iter().filter(|n| n.beyond > 0.0).count();
+    if nodes.len() <= LEAST_OTHERS || 2 * together > nodes.len() {
+        return None;
+    }
     let asked = model.promise.false_reject_asked / nodes.len().max(1) as f64;
     let limit = -2.0 * math::ln(asked) / INDEPENDENT;
     // The root is where the assembly is.
@@ -491,11 +496,12 @@ mod tests {
     use super::*;
     use crate::runtime::model::tests::tiny;
 
-    /// One of a hundred good photos may be rejected: for a lone node the square root of the ratio must be a hundred, 2 ln 100 = 9.2
-    /// in a hundred independent coefficients.
+    /// One of a hundred good photos may be rejected: for each of four nodes the square root of the ratio must be four hundred,
+    /// 2 ln 400 = 12 in a hundred independent coefficients.
     #[test]
     fn what_looks_right_beside_its_place_is_misplaced() {
         let mut model = tiny();
+        model.nodes = vec![model.nodes[0].clone(); 4];
         let report = |beyond: f64| NodeReport {
             name: "pin".into(),
             level: 1,
@@ -506,16 +512,20 @@ mod tests {
             best_fault: "missing".into(),
             inside: 1.0,
             unlike: Unlikeness::default(),
-            strangeness: 9.0,
+            strangeness: 1.0,
             lift: None,
             beyond,
             faulty: false,
             explained: false,
         };
-        assert_eq!(beside(&model, &[report(0.093)]), Some((0, MISPLACED)));
-        assert_eq!(beside(&model, &[report(0.091)]), Some((0, strange::UNKNOWN)));
-        assert_eq!(beside(&model, &[NodeReport { strangeness: 1.0, ..report(0.0) }]), None);
-        model.nodes[0].hypotheses.truncate(1);
-        assert_eq!(beside(&model, &[report(0.5)]), Some((0, strange::UNKNOWN)), "the root is where the assembly is");
+        let found = |model: &Model, beyond: [f64; 4]| beside(model, &beyond.map(report));
+        assert_eq!(found(&model, [0.0, 0.121, 0.0, 0.0]), Some((1, MISPLACED)));
+        assert_eq!(found(&model, [0.0, 0.119, 0.0, 0.0]), None);
+        assert_eq!(found(&model, [0.2, 0.3, 0.2, 0.0]), None, "the pose is wrong");
+        assert_eq!(beside(&model, &[report(0.5)]), None, "nothing tells where the assembly is");
+        let strange = [0.0, 0.0, 0.5, 0.0].map(|beyond| NodeReport { strangeness: 9.0 - beyond, ..report(beyond) });
+        assert_eq!(beside(&model, &strange), Some((2, MISPLACED)));
+        model.nodes[2].hypotheses.truncate(1);
+        assert_eq!(beside(&model, &strange), Some((3, strange::UNKNOWN)), "the root is where the assembly is");
     }
 }

@@ -8,6 +8,7 @@ use super::parts::{Listener, Part};
 use super::settle::Expected;
 use super::sight::Sight;
 use std::cell::{OnceCell, RefCell};
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 /// Local search: shifts of up to this many standard deviations of the node's place, and at most so many px of the photo,
@@ -183,7 +184,8 @@ impl<'a> Look<'a> {
             let round = WAYS.map(|way| [0, 1].map(|k| place[k] + step * f64::from(way[k])));
             let inside = round.into_iter().filter(|p| p.iter().all(|v| v.abs() <= FARTHEST));
             let Some((next, better)) = inside.map(|p| (p, fit(p))).max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
-            if better <= value {
+            // What is no number is no better.
+            if better.partial_cmp(&value) != Some(Ordering::Greater) {
                 break;
             }
             (place, value) = (next, better);

@@ -13,7 +13,7 @@ pub const POSE_RESIDUAL: f64 = 1.0;
 /// The same from photo to photo of one station (px).
 const PHOTO_RESIDUAL: f64 = 0.4;
 /// With fewer other nodes than this a photo does not tell how far all of them are off.
-const LEAST_OTHERS: usize = 3;
+pub(super) const LEAST_OTHERS: usize = 3;
 
 /// Where a node's good state is expected (px of the photo): middle and standard deviation of its shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
