@@ -48,7 +48,7 @@ fn opened(text: &str) -> Result<&str, String> {
 fn read(text: &str, name: &str, tables: &Tables) -> Result<Value, String> {
     let value = ron_value::parse(opened(text)?)?;
     check(&value, name, tables, name)?;
-    let format = if name == "Calibration" || name == "RigCalibration" { 5 } else { 6 };
+    let format = if name == "Calibration" || name == "RigCalibration" { 5 } else { 7 };
     match value.at("format") {
         Value::Int(is) if *is == format => Ok(value),
         other => Err(format!("format {other:?}")),
