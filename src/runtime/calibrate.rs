@@ -5,7 +5,7 @@
 //! own reflectance is not calibrated: parts differ.
 
 use super::grid::Grid;
-use super::inspect::{Finding, Inspector, NodeReport, light};
+use super::inspect::{Finding, Inspector, NodeReport, light, shows_mode};
 use super::judge::{NodeImages, Prepared};
 use super::light::{LightFit, fit_lamps};
 use super::linear;
@@ -214,10 +214,11 @@ fn suspicions(
 }
 
 /// Whether a node's verdict by renders alone proves a fault. Under a light that is not quite the described one a sound part
-/// can look a little raised; it must look as raised as half the held-out faults. It never looks like none.
+/// can look a little raised; it must look as raised as half the held-out faults. It never looks like none. What no error mode
+/// shows is no proof: which look of a sound part no render has is what the photo is there to tell.
 fn proves(node: &Node, report: &NodeReport) -> bool {
     let typical = node.fault_scores.get(node.fault_scores.len() / 2).copied().unwrap_or(0.0);
-    report.faulty && (report.best_fault != SLIGHT || report.score < typical)
+    shows_mode(report.score) && (report.best_fault != SLIGHT || report.score < typical)
 }
 
 /// The calibration without the question whether the photos show a fault.

@@ -4,13 +4,14 @@
 //! The assembly is located first; then every node of the object tree weighs the good state against each error mode, and the
 //! tree explains away what one fault does to its neighbours. Trouble never looks like go.
 
+mod evidence;
+
 use super::calibrate::{Calibration, widened};
-use super::camera::Camera;
+use super::camera::{Camera, Vec3};
 use super::density::Density;
-use super::judge::{Evidence, INDEPENDENT, NodeImages, Prepared, Pyramid};
+use super::judge::{Evidence, INDEPENDENT, NodeImages, Prepared};
 use super::light::Light;
 use super::locate::{Located, Search};
-use super::look::Look;
 use super::math;
 use super::model::{Model, Node};
 use super::parts::{Listener, Part, nobody};
@@ -70,7 +71,7 @@ pub struct NodeReport {
     /// Per hypothesis, log-likelihood ratio of the good state against it, per coefficient, by the image alone: [`rise::weighed`] adds
     /// what the node's place says.
     pub against: Vec<f64>,
-    /// The error mode that fits best.
+    /// The error mode that fits best; what else is wrong where no mode shows.
     pub best_fault: String,
     pub inside: f64,
     /// How unlike its good state the node is (see [`Evidence::unlike`]).
@@ -81,6 +82,7 @@ pub struct NodeReport {
     pub lift: Option<Lift>,
     /// By how much the good state fits better beyond where it is looked for: log-likelihood ratio per coefficient.
     pub beyond: f64,
+    /// By an error mode, or by what no mode shows; the score is below zero for the first alone.
     pub faulty: bool,
     /// Faulty by itself, but explained by another component's fault.
     pub explained: bool,
@@ -217,7 +219,8 @@ impl<'a> Inspector<'a> {
     }
 
     fn judge(&self, photo: &Photo, found: Located) -> Verdict {
-        let evidence = self.evidence(photo, &found.pose);
+        let (evidence, pose) = self.settled(photo, found.pose);
+        let found = Located { pose, ..found };
         (self.listener)(Part::Verdict);
         let mut nodes: Vec<NodeReport> =
             (0..evidence.len()).map(|i| self.report(i, &evidence[i], &found.pose)).collect();
@@ -228,14 +231,14 @@ impl<'a> Inspector<'a> {
         let order = self.blame(&mut nodes, &evidence, &disturbed);
         (self.listener)(Part::Verdict);
         let mut findings: Vec<Finding> = order.iter().map(|&i| self.finding(i, &nodes[i])).collect();
-        let hidden = nodes.iter().find(|n| n.inside < LEAST_INSIDE);
+        let hidden = nodes.iter().position(|n| n.inside < LEAST_INSIDE);
         if findings.is_empty() && hidden.is_none() {
-            let of = |(i, fault): (usize, &str)| Finding { fault: fault.into(), ..self.finding(i, &nodes[i]) };
-            findings.extend(beside(&self.model, &nodes).map(of));
+            findings.extend(mark_beside(&self.model, &mut nodes).map(|i| self.finding(i, &nodes[i])));
         }
         let (decision, reason) = match (&findings[..], hidden) {
             ([], None) => (Decision::Go, String::new()),
-            ([], Some(node)) => {
+            ([], Some(hidden)) => {
+                let node = &nodes[hidden];
                 let share = 100.0 * node.inside;
                 (Decision::CannotInspect, format!("only {share:.0} % of {} lies inside the photo", node.name))
             }
@@ -251,56 +254,6 @@ impl<'a> Inspector<'a> {
             nodes,
             outline: Some(self.outline(&found.pose)),
         }
-    }
-
-    /// Log-likelihoods of all nodes.
-    pub fn evidence(&self, photo: &Photo, pose: &Pose) -> Vec<Evidence> {
-        (self.listener)(Part::Windows);
-        let pyramid = self.prepared.pyramid(&photo.light);
-        let looks = self.looks(&pyramid, pose);
-        let factor = |node: usize| f64::from(self.prepared.nodes[node].window.frame.factor);
-        let shift = |(i, look): (usize, &Look)| look.measured_shift().map(|v| v * factor(i));
-        let shifts: Vec<[f64; 2]> = looks.iter().enumerate().map(shift).collect();
-        let own = |(i, look): (usize, &Look)| {
-            let expected = self.expected.as_ref().map(|all| settle::in_photo(all, &shifts, i));
-            let lift = self.lift(i, &shifts, pose);
-            Evidence { lift, ..self.prepared.nodes[i].evidence(look, expected.as_ref()) }
-        };
-        looks.iter().enumerate().map(own).collect()
-    }
-
-    /// How high a node's part appears to stand in a photo that shows the nodes at `shifts` (px).
-    fn lift(&self, node: usize, shifts: &[[f64; 2]], pose: &Pose) -> Option<Lift> {
-        let (rise, expected) = self.model.nodes[node].rise.as_ref().zip(self.expected.as_ref())?;
-        let (common, apart) = settle::others(expected, shifts, node);
-        let off = [0, 1].map(|k| shifts[node][k] - expected[node].at[k] - common[k]);
-        rise.lift(&self.camera, pose, off, apart)
-    }
-
-    /// Every node at a pose under its own hypotheses.
-    fn looks<'l>(&'l self, pyramid: &'l Pyramid, pose: &Pose) -> Vec<Look<'l>> {
-        let look = |(i, node): (usize, &'l NodeImages)| {
-            let reduced = pyramid.at(node.window.frame.factor);
-            node.look(&self.densities[i][..node.own], &self.light, reduced, &self.camera, pose, self.listener)
-        };
-        self.prepared.nodes.iter().enumerate().map(look).collect()
-    }
-
-    /// Log-likelihoods of the disturbed states of the nodes that need an explanation; empty for the others.
-    pub(super) fn disturbed(&self, nodes: &[NodeReport], photo: &Photo, pose: &Pose) -> Vec<Vec<f64>> {
-        let needed = |i: usize| nodes[i].faulty && !self.model.nodes[i].disturbed.is_empty();
-        if nodes.iter().filter(|n| n.faulty).count() < 2 {
-            return vec![Vec::new(); nodes.len()];
-        }
-        let pyramid = self.prepared.pyramid(&photo.light);
-        let states = |i: usize| {
-            let node = &self.prepared.nodes[i];
-            let densities = &self.densities[i][node.own..];
-            let reduced = pyramid.at(node.window.frame.factor);
-            let look = node.look(densities, &self.light, reduced, &self.camera, pose, &nobody);
-            node.evidence(&look, None).log_likelihoods
-        };
-        (0..nodes.len()).map(|i| if needed(i) { states(i) } else { Vec::new() }).collect()
     }
 
     fn report(&self, index: usize, evidence: &Evidence, pose: &Pose) -> NodeReport {
@@ -320,8 +273,7 @@ impl<'a> Inspector<'a> {
             strangeness: 0.0,
             lift: evidence.lift,
             beyond: evidence.beyond / self.coefficients(index).max(1) as f64,
-            // What is no number is no proof of anything.
-            faulty: score.is_nan() || score < 0.0,
+            faulty: shows_mode(score),
             explained: false,
         }
     }
@@ -388,12 +340,15 @@ impl<'a> Inspector<'a> {
 
     /// Corners of a box of the nominal photo as they lie in this one.
     fn carried(&self, [x0, y0, x1, y1]: [f64; 4], plane: f64, pose: &Pose) -> [[f64; 2]; 4] {
-        let home = self.prepared.home;
         [[x0, y0], [x1, y0], [x1, y1], [x0, y1]].map(|corner| {
-            let nominal = &self.model.station.camera;
-            let point = nominal.on_plane(corner, plane + home.z).map(|p| pose.apply(home.invert(p)));
+            let point = self.on_plane(corner, plane).map(|p| pose.apply(self.prepared.home.invert(p)));
             point.and_then(|p| self.camera.project(p)).unwrap_or(corner)
         })
+    }
+
+    /// The point at this height (mm, assembly frame) that the nominal photo shows there (px), in the station's frame.
+    fn on_plane(&self, at: [f64; 2], plane: f64) -> Option<Vec3> {
+        self.model.station.camera.on_plane(at, plane + self.prepared.home.z)
     }
 
     /// The box round all nodes, turned with the assembly.
@@ -428,6 +383,13 @@ pub fn beside(model: &Model, nodes: &[NodeReport]) -> Option<(usize, &'static st
     elsewhere(model, nodes).map(|i| (i, MISPLACED)).or_else(|| strange::strangest(nodes).map(|i| (i, strange::UNKNOWN)))
 }
 
+/// Marks the node in which something is wrong although no error mode shows, if there is one.
+fn mark_beside(model: &Model, nodes: &mut [NodeReport]) -> Option<usize> {
+    let (index, fault) = beside(model, nodes)?;
+    (nodes[index].faulty, nodes[index].best_fault) = (true, fault.into());
+    Some(index)
+}
+
 /// The node that most surely looks as it should, but beyond the reach of its search. Of renders of correct assemblies none does, so
 /// nothing is learnt from them: a likelihood ratio of Λ is at most 1 / Λ as likely, and that holds here for its square root. Where
 /// many nodes do, or there are few, it may be the pose that is wrong.
@@ -441,6 +403,11 @@ fn elsewhere(model: &Model, nodes: &[NodeReport]) -> Option<usize> {
     // The root is where the assembly is.
     let own = |i: &usize| model.nodes[*i].hypotheses.len() > 1 && nodes[*i].beyond > limit;
     (0..nodes.len()).filter(own).max_by(|&a, &b| nodes[a].beyond.total_cmp(&nodes[b].beyond))
+}
+
+/// Whether a score says that an error mode shows. What is no number is no proof of anything.
+pub(super) fn shows_mode(score: f64) -> bool {
+    score.is_nan() || score < 0.0
 }
 
 /// The light of a station whose lamps were calibrated to these weights.

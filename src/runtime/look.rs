@@ -197,6 +197,14 @@ impl<'a> Look<'a> {
         (student(place) - student(start)).max(0.0)
     }
 
+    /// The likeliest of all densities: its log-likelihood and its best shift (px of the photo).
+    pub(super) fn likeliest_state(&self) -> (f64, [f64; 2]) {
+        let free = self.free();
+        let all = (0..self.densities.len()).map(|density| self.likeliest(density, &free, 1.0));
+        let (fit, at) = all.fold((f64::NEG_INFINITY, 0), |best, of| if of.0 > best.0 { of } else { best });
+        (fit, self.shift(at).map(|v| v * self.factor))
+    }
+
     /// A shift in node px.
     pub(super) fn shift(&self, shift: usize) -> [f64; 2] {
         self.shifted[shift].shift

@@ -22,6 +22,7 @@ pub mod model;
 pub mod parts;
 pub mod photo;
 pub mod pose;
+mod regain;
 pub mod report;
 pub mod rig;
 pub mod rise;

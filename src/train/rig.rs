@@ -7,7 +7,7 @@
 use super::plan::{self, Plan};
 use super::stats::{rate, rounded};
 use super::synthesise::{Draws, Shots};
-use super::thresholds::{self, TRIM, at_share, most_shown};
+use super::thresholds::{self, at_share, most_shown};
 use super::verify::{self, Customer, HeldOut, Judged};
 use super::{CUSTOMERS, HELD_OUT_FAULTY, HELD_OUT_GOOD, Job, Observer, Step};
 use super::{advised, blind, fit_model, overlaps, render, shots};
@@ -22,6 +22,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// No camera is believed more than this many standard deviations between good and faulty: renders are no photos.
 const SUREST: f64 = 4.0;
+/// Share of the lowest goods and the highest faults left out when asking whether they overlap: photos in which the pose went wrong,
+/// which say nothing about the node.
+const TRIM: f64 = 0.1;
 /// The median distance of a normal variable from its mean is this share of a standard deviation.
 const MEDIAN_DISTANCE: f64 = 0.6745;
 /// Installations of different cameras are drawn this many customers apart.
@@ -258,7 +261,7 @@ fn set_thresholds(rig: &mut Rig, trials: &Trials) {
             let sum = |views: &Vec<&Verdict>| joint::sum(mode, &name, &cameras, views);
             let good = sorted(trials.goods().iter().filter_map(sum).collect());
             let faulty = sorted(trials.with(trials.scenes, &name, &mode.fault).iter().filter_map(sum).collect());
-            mode.threshold = rounded(thresholds::threshold(&good, most_shown(&faulty), allowed, 1.0));
+            mode.threshold = rounded(thresholds::threshold(&good, &faulty, allowed, 1.0));
         }
         let score = |views: &Vec<&Verdict>| rounded(joint::score(component, &cameras, views));
         let faulty = component.modes.iter().flat_map(|mode| trials.with(trials.scenes, &name, &mode.fault));

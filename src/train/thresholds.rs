@@ -3,19 +3,20 @@
 //! In: log-likelihood ratios of good and faulty renders against every hypothesis of a node. Out: a threshold per hypothesis and
 //! the node's scores. Never looks at an image.
 
-use super::stats::{normal_quantile, rounded};
+use super::stats::rounded;
 use crate::runtime::inspect;
 use crate::runtime::judge::INDEPENDENT;
 use crate::runtime::model::Node;
 use crate::runtime::rise::{Lift, Shown};
 
-/// Share of the lowest goods and the highest faults left out when asking whether they overlap: photos in which the pose
-/// went wrong, which say nothing about the node.
-pub(super) const TRIM: f64 = 0.1;
+/// Good renders that say, before any is seen, that ratios below zero are as rare as their size says.
+const TRUSTED: f64 = 15.0;
+/// No render counts for more than this many times what ratios say for themselves: in a photo in which the pose went wrong every
+/// node looks wrong, which says nothing of one of them.
+const WILDEST: f64 = 10.0;
 /// Fewer faulty renders say nothing of a hypothesis by themselves.
 const FEWEST: usize = 4;
-/// Who finds next to nothing gains nothing by coming near the goods: their spread, of which a few dozen renders of a few stations
-/// tell little, counts so many times.
+/// Who finds next to nothing gains nothing by coming near the goods, of which a few dozen renders of a few stations tell little.
 const SILENT: f64 = 2.0;
 /// Share of a normal variable more than one standard deviation below its mean.
 const ONE_DEVIATION_DOWN: f64 = 0.16;
@@ -32,7 +33,7 @@ pub struct Seen {
 
 /// Writes the thresholds and the scores into the node. `false_reject` is the node's share of what the spec allows. A mode
 /// that hardly differs from the good state must not make the node blind to one that does, nor a small fault to a large one: so
-/// each hypothesis has its own, from the renders of its mode that look most like it.
+/// each hypothesis has its own.
 pub fn set(node: &mut Node, seen: &Seen, false_reject: f64) {
     if node.hypotheses.len() < 2 {
         return;
@@ -61,35 +62,26 @@ fn sorted(all: &[Vec<f64>], value: impl Fn(&Vec<f64>) -> f64) -> Vec<f64> {
     out
 }
 
-/// The log-likelihood ratio below which a node counts as faulty in one way. Its sign decides, less what the promised rate of false
-/// rejects takes: of good renders a share `p0` falls below zero, and from there on likelihood ratios fall off as their own size
-/// says (a ratio of Λ is at most 1 / Λ as likely, Markov's inequality). Where the bulk of the goods reaches below zero, or it overlaps
-/// with that of the faulty ones and less than half of these are found, ratios are not what they say, and the spread of the goods may
-/// take more.
-/// Ratios are natural logarithms, a ratio of 1 being that of `independent` coefficients' worth.
-/// What then finds less than a quarter of the faulty renders that show most is kept far from the goods.
-/// Never a quantile of the goods: their few lowest scores say nothing about a photo's.
+/// The log-likelihood ratio below which a node counts as faulty in one way, from those of good renders, ascending. Its sign decides,
+/// less what the promised rate of false rejects takes: of good renders a share falls below zero, and from there on ever fewer, by the
+/// exponential law of likelihood ratios: a ratio of Λ is at most 1 / Λ as likely (Markov's inequality), so that the mean below zero
+/// is 1 / `independent` (ratios are natural logarithms, a ratio of 1 being that of `independent` coefficients' worth). Where
+/// renders lie further below on average, ratios are not what they say, and the renders are believed in proportion to their number.
+/// Where faulty renders lie has nothing to do with what a good photo shows; but what would find less than a quarter of those
+/// that show most is kept away from the goods.
 pub(super) fn threshold(good: &[f64], fault: &[f64], false_reject: f64, independent: f64) -> f64 {
     if good.is_empty() || fault.is_empty() {
         return 0.0;
     }
-    let (lowest, highest) = (at_share(good, TRIM), at_share(fault, 1.0 - TRIM));
     let middle = at_share(good, 0.5);
-    let below_zero = below_zero(middle, middle - at_share(good, ONE_DEVIATION_DOWN));
-    let by_ratio = -(below_zero / false_reject).ln().max(0.0) / independent;
-    let found = fault.iter().filter(|f| **f < by_ratio).count();
-    if lowest > 0.0 && (lowest > highest || 2 * found >= fault.len()) {
-        return by_ratio;
-    }
-    let mut distances: Vec<f64> = good.iter().map(|g| (g - middle).abs()).collect();
-    distances.sort_by(f64::total_cmp);
-    // The median distance of a normal variable from its mean is 0.6745 standard deviations.
-    let deviation = at_share(&distances, 0.5) / 0.6745;
-    let by_spread = |deviations: f64| (middle - deviations * deviation).min(by_ratio);
-    let usual = normal_quantile(1.0 - false_reject);
+    let below: Vec<f64> = good.iter().filter(|g| **g < 0.0).map(|g| -g.max(-WILDEST / independent)).collect();
+    let seen = below.len() as f64 / good.len() as f64;
+    let share = below_zero(middle, middle - at_share(good, ONE_DEVIATION_DOWN)).max(seen);
+    let mean = (below.iter().sum::<f64>() + TRUSTED / independent) / (below.len() as f64 + TRUSTED);
+    let limit = -(share / false_reject).ln().max(0.0) * mean.max(1.0 / independent);
     let shown = most_shown(fault);
-    let found = shown.iter().filter(|f| **f < by_spread(usual)).count();
-    by_spread(if 4 * found >= shown.len() { usual } else { SILENT * usual })
+    let found = shown.iter().filter(|f| **f < limit).count();
+    if 4 * found >= shown.len() { limit } else { SILENT * limit }
 }
 
 /// From how high a part appears to stand in correct assemblies and where it is not seated, and how far (px) its image moves per mm
@@ -135,11 +127,14 @@ mod tests {
     use crate::runtime::model::Hypothesis;
     use crate::runtime::model::tests::tiny;
 
+    /// Faults that every threshold finds.
+    const CLEAR: [f64; 4] = [-3.0; 4];
+
     #[test]
-    fn the_sign_decides_where_renders_lie_apart() {
+    fn the_sign_decides_where_goods_lie_far_above_zero() {
         let good = [0.2, 0.4, 0.42, 0.45, 0.45, 0.45, 0.48, 0.5, 0.5, 0.5, 0.6];
-        let fault = [-0.9, -0.8, -0.8, -0.7, -0.6, -0.5, -0.5, -0.4, -0.3, -0.2, 0.1];
-        assert_eq!(threshold(&good, &fault, 1e-3, INDEPENDENT), 0.0);
+        assert_eq!(threshold(&good, &CLEAR, 1e-3, INDEPENDENT), 0.0);
+        assert_eq!(threshold(&[], &CLEAR, 1e-3, INDEPENDENT), 0.0);
     }
 
     /// Goods of mean 0.2 and deviation 0.1 fall below zero in 0.5 e^-2 = 6.8 % of photos; one in a thousand is allowed:
@@ -147,60 +142,55 @@ mod tests {
     #[test]
     fn goods_near_zero_lower_it_by_what_the_promise_takes() {
         let good = [0.0, 0.1, 0.1, 0.15, 0.2, 0.2, 0.2, 0.25, 0.3, 0.3, 0.4];
-        let limit = threshold(&good, &[-0.8, -0.7, -0.6, -0.5], 1e-3, INDEPENDENT);
+        let limit = threshold(&good, &CLEAR, 1e-3, INDEPENDENT);
         assert!((limit + (0.5f64 * (-2.0f64).exp() / 1e-3).ln() / 100.0).abs() < 1e-9, "{limit}");
-        assert!(
-            threshold(&good, &[-0.8, -0.7, -0.6, -0.5], 1e-5, INDEPENDENT) < limit,
-            "a stricter promise costs more"
-        );
+        assert!(threshold(&good, &CLEAR, 1e-5, INDEPENDENT) < limit, "a stricter promise costs more");
     }
 
-    /// Good renders of a part that hardly shows scatter into what its faults look like: who finds one fault in five may not
-    /// reject as many good ones.
+    /// Three of 24 goods lie 0.05 below zero on average, where fifteen trusted ones would lie 0.01: 0.3 / 18 together, and one
+    /// in eight is 125 times too many.
     #[test]
-    fn what_finds_next_to_nothing_rejects_nothing() {
-        let good = [0.01, 0.02, 0.05, 0.08, 0.1, 0.12, 0.15, 0.18, 0.2];
-        let limit = |fault: &[f64]| threshold(&good, fault, 1e-3, INDEPENDENT);
-        let spread = |deviations: f64| 0.1 - deviations * 3.0902 * 0.05 / 0.6745;
-        assert!((limit(&[-0.3, 0.0, 0.05, 0.1, 0.1]) - spread(1.0)).abs() < 1e-3, "one of the three that show most");
-        assert!((limit(&[-0.1, 0.0, 0.05, 0.1, 0.1]) - spread(SILENT)).abs() < 1e-3, "none");
-        assert!(limit(&[-0.3, -0.3, -0.3, 0.05, 0.1]) > spread(1.0) + 0.05, "most are found");
+    fn renders_that_belie_the_ratio_lower_it_in_proportion_to_their_number() {
+        let good = |low: [f64; 3]| -> Vec<f64> { low.into_iter().chain([0.5; 21]).collect() };
+        let limit = |low: [f64; 3]| threshold(&good(low), &CLEAR, 1e-3, INDEPENDENT);
+        let deep = limit([-0.06, -0.05, -0.04]);
+        assert!((deep + 0.3 / 18.0 * 125f64.ln()).abs() < 1e-9, "{deep}");
+        let shallow = limit([-0.006, -0.005, -0.004]);
+        assert!((shallow + 0.01 * 125f64.ln()).abs() < 1e-9, "never less than ratios say: {shallow}");
+        assert_eq!(limit([-5.0, -0.05, -0.04]), limit([-0.1, -0.05, -0.04]), "a lost photo says only that it was lost");
     }
 
-    /// Of a sweep the large half lies apart, the small half does not: it alone has the spread's threshold.
+    /// Who finds one in four of those that show most may come as near as the goods allow.
+    #[test]
+    fn what_finds_next_to_nothing_stays_away_from_the_goods() {
+        let good = [0.0, 0.1, 0.1, 0.15, 0.2, 0.2, 0.2, 0.25, 0.3, 0.3, 0.4];
+        let limit = |fault: &[f64]| threshold(&good, fault, 1e-3, INDEPENDENT);
+        assert_eq!(limit(&[-0.3, 0.0, 0.05, 0.1, 0.1]), limit(&CLEAR));
+        assert_eq!(limit(&[-0.01, 0.0, 0.05, 0.1, 0.1]), SILENT * limit(&CLEAR));
+    }
+
+    proptest::proptest! {
+        /// It never finds what looks better than good, and the stricter promise finds no more.
+        #[test]
+        fn a_stricter_promise_never_rejects_more(mut good in proptest::collection::vec(-1.0f64..1.0, 1..40), share in 1e-6f64..0.1) {
+            good.sort_by(f64::total_cmp);
+            let [strict, lax] = [0.1, 1.0].map(|by| threshold(&good, &CLEAR, by * share, INDEPENDENT));
+            proptest::prop_assert!(strict <= lax && lax <= 0.0);
+        }
+    }
+
+    /// A small fault near which the goods lie takes nothing of a large one's threshold.
     #[test]
     fn a_small_fault_hides_no_large_one() {
-        let good: Vec<Vec<f64>> =
-            [-0.1, -0.02, 0.0, 0.05, 0.1, 0.15].iter().map(|&small| vec![0.0, small, 0.5 + small]).collect();
-        let small = [-0.3, -0.2, -0.1, 0.0, 0.05].map(|v| vec![0.0, v, v + 0.3]);
-        let large = [-0.9, -0.8, -0.7, -0.6, -0.5].map(|v| vec![0.0, v + 0.4, v]);
-        let faulty = vec![("not seated".to_string(), small.into_iter().chain(large).collect())];
+        let good = [-0.1, -0.02, 0.0, 0.05, 0.1, 0.15].map(|small| vec![0.0, small, 0.5 + small]).to_vec();
         let mut node = tiny().nodes.remove(0);
         let of = |fault: &str| Hypothesis { fault: fault.into(), ..node.hypotheses[0].clone() };
         node.hypotheses = ["good", "not seated", "not seated"].map(of).into();
-        set(&mut node, &Seen { good, faulty }, 1e-3);
+        let faulty = vec![vec![0.0, -0.5, 0.2], vec![0.0, -0.5, -0.9]];
+        set(&mut node, &Seen { good, faulty: vec![("not seated".into(), faulty)] }, 1e-3);
         let limits: Vec<f64> = node.hypotheses.iter().map(|h| h.threshold).collect();
-        assert!(limits[1] < -0.2 && limits[2] > -0.1, "{limits:?}");
-    }
-
-    /// A gap between good and faulty renders, however clear, says nothing of the next good one where the ratio has no meaning: only
-    /// their spread does.
-    #[test]
-    fn a_gap_below_zero_is_no_promise() {
-        let good = [-0.05, -0.04, -0.03, -0.01, 0.0, 0.05, 0.1, 0.15, 0.2, 0.25];
-        let limit = threshold(&good, &[-0.09, -0.08, -0.08, -0.07, -0.06, -0.06], 1e-3, INDEPENDENT);
-        assert!(limit < -0.3, "{limit}");
-        let far = threshold(&[-0.2, -0.1, 0.0], &[-0.8, -0.7, -0.6], 1e-3, INDEPENDENT);
-        assert!((far - (-0.1 - 3.0902 * 0.1 / 0.6745)).abs() < 1e-3, "{far}");
-        assert_eq!(threshold(&[0.3, 0.4], &[0.1, 0.2], 1e-3, INDEPENDENT), 0.0);
-    }
-
-    #[test]
-    fn where_they_overlap_the_spread_of_the_goods_decides_if_it_takes_more() {
-        let limit = |good: &[f64]| threshold(good, &[-0.3, -0.1, 0.0, 0.1], 1e-3, INDEPENDENT);
-        let (by_spread, by_ratio) = (|deviation: f64| -3.0902 * deviation / 0.6745, -(0.5f64 / 1e-3).ln() / 100.0);
-        assert!((limit(&[-0.010, -0.005, 0.0, 0.005, 0.010]) - by_ratio).abs() < 1e-9, "what the ratio takes");
-        assert!((limit(&[-0.1, -0.05, 0.0, 0.05, 0.1]) - by_spread(0.05)).abs() < 1e-3, "renders belie the ratio");
+        assert!(limits[1] < -0.1 && limits[2] == 0.0, "{limits:?}");
+        assert_eq!(node.fault_scores.len(), 2);
     }
 
     /// Seated parts within 0.1 mm, raised ones from 0.5 to 1 mm; an image that moves by 10 px per mm tells 0.02 mm at best, one

@@ -32,4 +32,8 @@ fn what_looks_right_beside_its_place_is_misplaced() {
     assert_eq!(beside(&model, &strange), Some((2, MISPLACED)));
     model.nodes[2].hypotheses.truncate(1);
     assert_eq!(beside(&model, &strange), Some((3, strange::UNKNOWN)), "the root is where the assembly is");
+    let mut marked = strange.to_vec();
+    assert_eq!(mark_beside(&model, &mut marked), Some(3));
+    assert_eq!((marked[3].best_fault.as_str(), marked[3].faulty, marked[3].score), (strange::UNKNOWN, true, 0.1));
+    assert!(!marked[2].faulty && !shows_mode(marked[3].score), "no mode shows: a calibration photo may look like that");
 }
