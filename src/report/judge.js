@@ -93,7 +93,7 @@
     if (verdict.verdict === 'cannot-inspect') about.append(make('p', {}, verdict.reason));
     const finding = ({ component, fault, p_value }) => {
       const chance = p_value === null ? '–' : `at most ${number(100 * p_value, 1)} %`;
-      return make('li', {}, make('b', {}, component), `: ${fault} `, make('small', {}, `(${chance} of held-out good renders score as low)`));
+      return make('li', {}, make('b', {}, component), `: ${fault} `, make('small', {}, `(${chance} of correct assemblies look as bad)`));
     };
     if (verdict.findings.length) about.append(make('ul', { class: 'list' }, ...verdict.findings.map(finding)));
     const place = ({ x, y, rotation_deg }) => `Found at (${number(x, 2)}, ${number(y, 2)}) mm, turned ${number(rotation_deg, 2)}°, locator's score ${number(verdict.locator_score, 2)}. `;

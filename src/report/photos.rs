@@ -71,7 +71,7 @@ fn card(index: usize, shot: &Shot, report: &Report) -> String {
 
 fn finding(finding: &Finding) -> String {
     format!(
-        "<li><b>{}</b>: {} <small>({} of held-out good renders score as low)</small></li>",
+        "<li><b>{}</b>: {} <small>({} of correct assemblies look as bad)</small></li>",
         escaped(&finding.component),
         escaped(&finding.fault),
         if finding.p_value.is_finite() { format!("at most {}", percent(finding.p_value)) } else { "–".into() }

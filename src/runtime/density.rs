@@ -224,6 +224,12 @@ impl Density {
     }
 }
 
+/// Sum of the logarithms of Student-t densities of one scale relative to their peak.
+pub fn of_scale(z: &[f32], scale: f64) -> f64 {
+    let rest: Vec<f32> = z.iter().map(|v| v / scale as f32).collect();
+    -(STUDENT + 1.0) / 2.0 * log_tails(&rest)
+}
+
 fn identity(n: usize) -> Vec<f64> {
     (0..n * n).map(|i| f64::from(u8::from(i % (n + 1) == 0))).collect()
 }

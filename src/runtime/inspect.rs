@@ -50,7 +50,7 @@ pub struct Finding {
     pub error_tree: String,
     /// The node in which it showed.
     pub node: String,
-    /// Share of held-out good renders that score as low.
+    /// At most such a share of correct assemblies looks as wrong: of held-out good renders where an error mode shows.
     pub p_value: f64,
     /// Box in the photo (px): x0, y0, x1, y1.
     #[serde(rename = "box")]
@@ -182,16 +182,17 @@ impl<'a> Inspector<'a> {
         let photo = &*photo.flattened(self.model.station.vignetting);
         let located = self.locate(&self.search, photo);
         let least = self.least_score();
-        match located {
-            Some(found) if found.score >= least => self.judge(photo, found),
-            found => self.judge_without(photo, least).unwrap_or_else(|| not_found(found, least)),
+        match located.first() {
+            Some(found) if found.score >= least => self.judge(photo, &located),
+            found => self.judge_without(photo, least).unwrap_or_else(|| not_found(found.copied(), least)),
         }
     }
 
-    fn locate(&self, search: &Search, photo: &Photo) -> Option<Located> {
+    /// The poses of which the edges speak, best first.
+    fn locate(&self, search: &Search, photo: &Photo) -> Vec<Located> {
         (self.listener)(Part::Fields);
         let fields = search.fields(&photo.light, self.calibration.noise);
-        search.locate_heard(&fields, &self.camera, &widened(&self.model), self.listener)
+        search.rivals(&fields, &self.camera, &widened(&self.model), self.listener)
     }
 
     /// The verdict on an assembly that is found only when the edges of one component are not looked for, if that
@@ -203,8 +204,8 @@ impl<'a> Inspector<'a> {
         }
         let attempt = |group: usize| -> Option<Verdict> {
             let search = Search::without(&self.model, Some(group));
-            let found = self.locate(&search, photo)?;
-            let verdict = (found.score >= least).then(|| self.judge(photo, found))?;
+            let found = self.locate(&search, photo);
+            let verdict = (found.first()?.score >= least).then(|| self.judge(photo, &found))?;
             let blamed = verdict.findings.iter().any(|f| f.component == locator.groups[group].name);
             blamed.then_some(verdict)
         };
@@ -218,9 +219,9 @@ impl<'a> Inspector<'a> {
         if locator.unsigned { locator.accept } else { locator.accept.max(LEAST_SCORE * self.calibration.score) }
     }
 
-    fn judge(&self, photo: &Photo, found: Located) -> Verdict {
-        let (evidence, pose) = self.settled(photo, found.pose);
-        let found = Located { pose, ..found };
+    /// Judges the assembly where it most likely stands, of the poses of which the edges speak.
+    fn judge(&self, photo: &Photo, located: &[Located]) -> Verdict {
+        let (evidence, found) = self.settled(photo, located);
         (self.listener)(Part::Verdict);
         let mut nodes: Vec<NodeReport> =
             (0..evidence.len()).map(|i| self.report(i, &evidence[i], &found.pose)).collect();
@@ -230,10 +231,12 @@ impl<'a> Inspector<'a> {
         let disturbed = self.disturbed(&nodes, photo, &found.pose);
         let order = self.blame(&mut nodes, &evidence, &disturbed);
         (self.listener)(Part::Verdict);
-        let mut findings: Vec<Finding> = order.iter().map(|&i| self.finding(i, &nodes[i])).collect();
+        let of_mode = |&i: &usize| self.finding(i, &nodes[i], p_value(&self.model.nodes[i], nodes[i].score));
+        let mut findings: Vec<Finding> = order.iter().map(of_mode).collect();
         let hidden = nodes.iter().position(|n| n.inside < LEAST_INSIDE);
         if findings.is_empty() && hidden.is_none() {
-            findings.extend(mark_beside(&self.model, &mut nodes).map(|i| self.finding(i, &nodes[i])));
+            let beside = mark_beside(&self.model, &mut nodes);
+            findings.extend(beside.map(|(i, p_value)| self.finding(i, &nodes[i], p_value)));
         }
         let (decision, reason) = match (&findings[..], hidden) {
             ([], None) => (Decision::Go, String::new()),
@@ -322,7 +325,7 @@ impl<'a> Inspector<'a> {
         beside.fold(f64::NEG_INFINITY, f64::max) > own
     }
 
-    fn finding(&self, index: usize, report: &NodeReport) -> Finding {
+    fn finding(&self, index: usize, report: &NodeReport, p_value: f64) -> Finding {
         let node = &self.model.nodes[index];
         let xs = report.outline.map(|p| p[0]);
         let ys = report.outline.map(|p| p[1]);
@@ -333,7 +336,7 @@ impl<'a> Inspector<'a> {
             fault: report.best_fault.clone(),
             error_tree: node.name.clone(),
             node: node.name.clone(),
-            p_value: p_value(node, report.score),
+            p_value,
             box_px: [min(xs), min(ys), max(xs), max(ys)],
         }
     }
@@ -383,25 +386,39 @@ pub fn beside(model: &Model, nodes: &[NodeReport]) -> Option<(usize, &'static st
     elsewhere(model, nodes).map(|i| (i, MISPLACED)).or_else(|| strange::strangest(nodes).map(|i| (i, strange::UNKNOWN)))
 }
 
-/// Marks the node in which something is wrong although no error mode shows, if there is one.
-fn mark_beside(model: &Model, nodes: &mut [NodeReport]) -> Option<usize> {
+/// Marks the node in which something is wrong although no error mode shows, if there is one, and says how rarely a correct
+/// assembly looks so.
+fn mark_beside(model: &Model, nodes: &mut [NodeReport]) -> Option<(usize, f64)> {
     let (index, fault) = beside(model, nodes)?;
     (nodes[index].faulty, nodes[index].best_fault) = (true, fault.into());
-    Some(index)
+    let usual = asked_of_node(model, nodes);
+    // Strangeness decides at the share that was asked for, and says no more beyond.
+    let p_value = if fault == MISPLACED { chance_beyond(nodes[index].beyond).min(usual) } else { usual };
+    Some((index, p_value))
 }
 
-/// The node that most surely looks as it should, but beyond the reach of its search. Of renders of correct assemblies none does, so
-/// nothing is learnt from them: a likelihood ratio of Λ is at most 1 / Λ as likely, and that holds here for its square root. Where
-/// many nodes do, or there are few, it may be the pose that is wrong.
+/// The share of correct assemblies that may be rejected for one node without an error mode.
+fn asked_of_node(model: &Model, nodes: &[NodeReport]) -> f64 {
+    model.promise.false_reject_asked / nodes.len().max(1) as f64
+}
+
+/// How rarely a part in its place looks so much better beside it (log-likelihood ratio per coefficient). Of renders of correct
+/// assemblies none does, so nothing is learnt from them: a likelihood ratio of Λ is at most 1 / Λ as likely, and that holds here
+/// for its square root.
+fn chance_beyond(beyond: f64) -> f64 {
+    math::exp(-beyond * INDEPENDENT / 2.0)
+}
+
+/// The node that most surely looks as it should, but beyond the reach of its search. Where many nodes do, or there are few, it may
+/// be the pose that is wrong.
 fn elsewhere(model: &Model, nodes: &[NodeReport]) -> Option<usize> {
     let together = nodes.iter().filter(|n| n.beyond > 0.0).count();
     if nodes.len() <= LEAST_OTHERS || 2 * together > nodes.len() {
         return None;
     }
-    let asked = model.promise.false_reject_asked / nodes.len().max(1) as f64;
-    let limit = -2.0 * math::ln(asked) / INDEPENDENT;
+    let asked = asked_of_node(model, nodes);
     // The root is where the assembly is.
-    let own = |i: &usize| model.nodes[*i].hypotheses.len() > 1 && nodes[*i].beyond > limit;
+    let own = |i: &usize| model.nodes[*i].hypotheses.len() > 1 && chance_beyond(nodes[*i].beyond) < asked;
     (0..nodes.len()).filter(own).max_by(|&a, &b| nodes[a].beyond.total_cmp(&nodes[b].beyond))
 }
 

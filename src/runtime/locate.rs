@@ -16,7 +16,12 @@ use super::settle;
 
 /// How many coarse poses are followed, quickly, and how many of them to the end.
 const BEAM: usize = 12;
-const FINALISTS: usize = 3;
+const FINALISTS: usize = 6;
+/// A pose that has this share of the best one's score is a rival of it, followed to the end or quickly, if it moves the edges by so
+/// many px of the photo. Edges can be had by a shadow, or by the grain of wood.
+const RIVAL: f64 = 0.8;
+const QUICK_RIVAL: f64 = 0.6;
+const APART: f64 = 3.0;
 /// A first look at a pose of the grid asks one point in so many; one pose in so many is looked at again, or at least so many.
 const FIRST_LOOK: usize = 4;
 const KEPT_OF: usize = 8;
@@ -151,17 +156,17 @@ impl Search {
 
     /// The best pose within `standing` (ranges of x, y, z, rz), or `None` when there is nothing to go by.
     pub fn locate(&self, fields: &Fields, camera: &Camera, standing: &[[f64; 2]; 4]) -> Option<Located> {
-        self.locate_heard(fields, camera, standing, &nobody)
+        self.rivals(fields, camera, standing, &nobody).into_iter().next()
     }
 
-    /// The same, with the parts of it told.
-    pub(super) fn locate_heard(
+    /// The best pose, and what others the edges speak for nearly as clearly; best first. Tells the parts of its work.
+    pub(super) fn rivals(
         &self,
         fields: &Fields,
         camera: &Camera,
         standing: &[[f64; 2]; 4],
         listener: &Listener,
-    ) -> Option<Located> {
+    ) -> Vec<Located> {
         listener(Part::Poses);
         let candidates = self.coarse(fields, &camera.reduced(self.coarse_factor), standing);
         listener(Part::Edges);
@@ -170,14 +175,27 @@ impl Search {
             let pose = self.refine(&fine, pose, standing, effort);
             Located { pose, score: self.score(&fields.fine, &fine.camera, &pose) }
         };
-        let mut quick: Vec<Located> = candidates.into_iter().map(|pose| followed(pose, QUICK)).collect();
-        quick.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let finalists = quick.into_iter().take(FINALISTS).map(|found| followed(found.pose, FULL));
-        let found = finalists.max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let quick: Vec<Located> = candidates.into_iter().map(|pose| followed(pose, QUICK)).collect();
+        let quick = self.distinct(quick, camera, QUICK_RIVAL);
+        let finalists = quick.into_iter().take(FINALISTS).map(|found| followed(found.pose, FULL)).collect();
+        let rivals = self.distinct(finalists, camera, RIVAL);
         let finer = |pose, (factor, field): &(u32, Field)| {
             self.refine(&Level::new(field, camera, *factor), pose, standing, FULL)
         };
-        Some(Located { pose: fields.finer.iter().fold(found.pose, finer), ..found })
+        rivals.iter().map(|r| Located { pose: fields.finer.iter().fold(r.pose, finer), ..*r }).collect()
+    }
+
+    /// Those that score at least this share of the best, best first, without what is as good as one of them.
+    fn distinct(&self, mut all: Vec<Located>, camera: &Camera, share: f64) -> Vec<Located> {
+        all.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let least = all.first().map_or(0.0, |best| best.score - (1.0 - share) * best.score.abs());
+        let mut distinct: Vec<Located> = Vec::new();
+        for found in all.into_iter().filter(|f| f.score >= least) {
+            if distinct.iter().all(|other| self.speed(camera, &other.pose, &found.pose) > APART) {
+                distinct.push(found);
+            }
+        }
+        distinct
     }
 
     /// The best poses of the grid, one per neighbourhood, best first.
@@ -343,13 +361,7 @@ impl Search {
             };
             view.pulls(&points, reach, parameters, seen_at, &pose)
         });
-        let mut array = with(&parameters).to_array();
-        for (value, [low, high]) in array.iter_mut().zip(standing) {
-            // A tenth of the range beyond its ends: the ranges are a promise, not a law.
-            let margin = (high - low) * 0.1;
-            *value = value.clamp(low - margin, high + margin);
-        }
-        Pose::from_array(array)
+        with(&parameters).held(standing)
     }
 
     /// Poses of several photos and the installation they share, from starting poses: regularised by the spec's priors.

@@ -197,12 +197,16 @@ impl<'a> Look<'a> {
         (student(place) - student(start)).max(0.0)
     }
 
-    /// The likeliest of all densities: its log-likelihood and its best shift (px of the photo).
-    pub(super) fn likeliest_state(&self) -> (f64, [f64; 2]) {
+    /// The likeliest of all densities: its log-likelihood and its best shift, of those tried.
+    pub(super) fn likeliest_state(&self) -> (f64, usize) {
         let free = self.free();
         let all = (0..self.densities.len()).map(|density| self.likeliest(density, &free, 1.0));
-        let (fit, at) = all.fold((f64::NEG_INFINITY, 0), |best, of| if of.0 > best.0 { of } else { best });
-        (fit, self.shift(at).map(|v| v * self.factor))
+        all.fold((f64::NEG_INFINITY, 0), |best, of| if of.0 > best.0 { of } else { best })
+    }
+
+    /// A shift in px of the photo.
+    pub(super) fn shift_in_photo(&self, shift: usize) -> [f64; 2] {
+        self.shift(shift).map(|v| v * self.factor)
     }
 
     /// A shift in node px.

@@ -2,6 +2,7 @@
 //!
 //! An island: it knows nothing of the compiler and builds alone with `--no-default-features`.
 
+mod anywhere;
 pub mod calibrate;
 pub mod camera;
 pub mod density;

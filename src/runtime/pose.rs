@@ -5,6 +5,9 @@ use super::math::sin_cos;
 use super::model::{Install, Station};
 use serde::{Deserialize, Serialize};
 
+/// Part of a standing range beyond its ends that a pose may lie: the ranges are a promise, not a law.
+const MARGIN: f64 = 0.1;
+
 /// The assembly on the station: x, y, z in mm, turn about the plate's normal in rad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -27,6 +30,17 @@ impl Pose {
     /// The middle of the ranges in which the assembly may stand.
     pub fn home(station: &Station) -> Pose {
         Pose::from_array(station.standing.map(|[low, high]| (low + high) / 2.0))
+    }
+
+    /// The nearest pose at which the assembly can stand: a little beyond the ranges (of x, y, z, rz) at most.
+    #[must_use]
+    pub fn held(self, standing: &[[f64; 2]; 4]) -> Pose {
+        let mut array = self.to_array();
+        for (value, [low, high]) in array.iter_mut().zip(standing) {
+            let margin = (high - low) * MARGIN;
+            *value = value.clamp(low - margin, high + margin);
+        }
+        Pose::from_array(array)
     }
 
     /// Assembly frame to station frame.
@@ -127,6 +141,13 @@ mod tests {
         let p = [10.0, -4.0, 7.0];
         let back = pose.invert(pose.apply(p));
         assert!((0..3).all(|i| (back[i] - p[i]).abs() < 1e-12));
+    }
+
+    #[test]
+    fn a_pose_is_held_near_where_it_may_stand() {
+        let standing = [[-5.0, 5.0], [0.0, 1.0], [2.0, 2.0], [-0.2, 0.2]];
+        let held = Pose { x: 7.0, y: -0.05, z: 3.0, rz: -0.1 }.held(&standing);
+        assert_eq!(held, Pose { x: 6.0, y: -0.05, z: 2.0, rz: -0.1 });
     }
 
     #[test]

@@ -13,8 +13,6 @@ use super::settle::LEAST_OTHERS;
 const ROUNDS: usize = 5;
 /// A node that is off by so many of its standard deviations counts half.
 const ROBUST: f64 = 2.0;
-/// Part of the standing range beyond its ends that a pose may lie: the ranges are a promise, not a law.
-const MARGIN: f64 = 0.1;
 
 /// Where one node fits best.
 pub struct Fit {
@@ -61,14 +59,10 @@ pub fn corrected(pose: &Pose, camera: &Camera, standing: &[[f64; 2]; 4], fits: &
         step = linear::solve_spd(&normal, &right)?;
     }
     let mut array = pose.to_array();
-    for (&axis, by) in free.iter().zip(&step) {
-        let [low, high] = standing[axis];
-        let margin = (high - low) * MARGIN;
-        array[axis] = (array[axis] + by).clamp(low - margin, high + margin);
-    }
+    free.iter().zip(&step).for_each(|(&axis, by)| array[axis] += by);
     let squares = (0..fits.len()).flat_map(|node| [0, 1].map(|axis| moved(&step, node, axis).powi(2)));
     let motion = (squares.sum::<f64>() / fits.len() as f64).sqrt();
-    motion.is_finite().then(|| (Pose::from_array(array), motion))
+    motion.is_finite().then(|| (Pose::from_array(array).held(standing), motion))
 }
 
 /// By how many px a point moves in the photo per mm or rad of every free axis; `None` where the camera does not see it.

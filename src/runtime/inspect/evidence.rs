@@ -4,8 +4,10 @@
 //! that suits them all better. Never decides.
 
 use super::{Inspector, LEAST_INSIDE, NodeReport};
+use crate::runtime::anywhere::{Anywhere, Seen};
 use crate::runtime::calibrate::widened;
 use crate::runtime::judge::{Evidence, NodeImages, Pyramid};
+use crate::runtime::locate::Located;
 use crate::runtime::look::Look;
 use crate::runtime::parts::{Part, nobody};
 use crate::runtime::photo::Photo;
@@ -14,27 +16,60 @@ use crate::runtime::regain::{self, Fit};
 use crate::runtime::rise::Lift;
 use crate::runtime::settle::{self, POSE_RESIDUAL};
 
+/// The nodes of a photo where the assembly may stand.
+struct Place<'l> {
+    found: Located,
+    looks: Vec<Look<'l>>,
+}
+
 /// The pose is taken anew where the nodes are this many times further from it than it leaves them, at most so many times.
 const ELSEWHERE: f64 = 3.0;
 const REGAINS: usize = 4;
 
 impl Inspector<'_> {
-    /// Log-likelihoods of all nodes, and the pose at which they were taken: where the nodes agree that they stand elsewhere and
-    /// look more like themselves there, that is where the assembly stands.
-    pub(super) fn settled(&self, photo: &Photo, mut pose: Pose) -> (Vec<Evidence>, Pose) {
+    /// Log-likelihoods of all nodes, and the pose at which they were taken: of those that the edges tell the one where the nodes
+    /// explain most; and where they agree that they stand elsewhere and explain more there, that is where the assembly stands.
+    pub(super) fn settled(&self, photo: &Photo, located: &[Located]) -> (Vec<Evidence>, Located) {
         (self.listener)(Part::Windows);
         let pyramid = self.prepared.pyramid(&photo.light);
-        let mut looks = self.looks(&pyramid, &pose);
-        let likelihood = |looks: &[Look]| looks.iter().map(|look| look.likeliest_state().0).sum::<f64>();
+        let place = |found: Located| Place { looks: self.looks(&pyramid, &found.pose), found };
+        let mut places: Vec<Place> = located.iter().copied().map(place).collect();
+        let mut taken = places.swap_remove(self.clearest(&places));
         for _ in 0..REGAINS {
-            let Some(other) = self.regained(&looks, &pose) else { break };
-            let there = self.looks(&pyramid, &other);
-            if likelihood(&there) <= likelihood(&looks) {
+            let Some(pose) = self.regained(&taken.looks, &taken.found.pose) else { break };
+            let there = place(Located { pose, ..taken.found });
+            let mut both = vec![taken, there];
+            let clearest = self.clearest(&both);
+            taken = both.swap_remove(clearest);
+            if clearest == 0 {
                 break;
             }
-            (looks, pose) = (there, other);
         }
-        (self.weighed(&looks, &pose), pose)
+        (self.weighed(&taken.looks, &taken.found.pose), taken.found)
+    }
+
+    /// The place of which the nodes explain most beside what any place of this photo looks like, the first of equals.
+    fn clearest(&self, places: &[Place]) -> usize {
+        if places.len() < 2 {
+            return 0;
+        }
+        let states: Vec<Vec<(f64, Seen)>> = places.iter().map(|place| self.states(&place.looks)).collect();
+        let anywhere = Anywhere::of(states.iter().flatten().map(|(_, seen)| seen));
+        let explained = |of: &Vec<(f64, Seen)>| -> f64 {
+            of.iter().map(|(likelihood, seen)| likelihood - anywhere.log_likelihood(seen)).sum()
+        };
+        let explained: Vec<f64> = states.iter().map(explained).collect();
+        (0..places.len()).rev().max_by(|&a, &b| explained[a].total_cmp(&explained[b])).unwrap_or(0)
+    }
+
+    /// Every node in its likeliest state: its log-likelihood and its window.
+    fn states<'l>(&'l self, looks: &'l [Look]) -> Vec<(f64, Seen<'l>)> {
+        let state = |(look, node): (&'l Look, &'l NodeImages)| {
+            let (likelihood, shift) = look.likeliest_state();
+            let coefficients = look.coefficients(shift);
+            (likelihood, Seen { factor: node.window.frame.factor, levels: &node.stencil.levels, coefficients })
+        };
+        looks.iter().zip(&self.prepared.nodes).map(state).collect()
     }
 
     /// The pose to which the nodes point, if that is elsewhere.
@@ -42,7 +77,7 @@ impl Inspector<'_> {
         let fit = |(i, look): (usize, &Look)| {
             let node = &self.model.nodes[i];
             let expected = self.expected.as_ref().map_or([0.0; 2], |all| all[i].at);
-            let (_, shift) = look.likeliest_state();
+            let shift = look.shift_in_photo(look.likeliest_state().1);
             let off = [0, 1].map(|k| shift[k] - expected[k]);
             let [x0, y0, x1, y1] = node.visible;
             let at = self.prepared.home.invert(self.on_plane([(x0 + x1) / 2.0, (y0 + y1) / 2.0], node.plane)?);

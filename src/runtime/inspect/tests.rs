@@ -30,10 +30,13 @@ fn what_looks_right_beside_its_place_is_misplaced() {
     assert_eq!(beside(&model, &[report(0.5)]), None, "nothing tells where the assembly is");
     let strange = [0.0, 0.0, 0.5, 0.0].map(|beyond| NodeReport { strangeness: 9.0 - beyond, ..report(beyond) });
     assert_eq!(beside(&model, &strange), Some((2, MISPLACED)));
+    let mut moved = strange.to_vec();
+    let (node, chance) = mark_beside(&model, &mut moved).unwrap();
+    assert!(node == 2 && (chance / (-25.0f64).exp() - 1.0).abs() < 1e-9, "exp(-0.5 · 100 / 2): {chance}");
     model.nodes[2].hypotheses.truncate(1);
     assert_eq!(beside(&model, &strange), Some((3, strange::UNKNOWN)), "the root is where the assembly is");
     let mut marked = strange.to_vec();
-    assert_eq!(mark_beside(&model, &mut marked), Some(3));
+    assert_eq!(mark_beside(&model, &mut marked), Some((3, 0.0025)), "a hundredth for four nodes");
     assert_eq!((marked[3].best_fault.as_str(), marked[3].faulty, marked[3].score), (strange::UNKNOWN, true, 0.1));
     assert!(!marked[2].faulty && !shows_mode(marked[3].score), "no mode shows: a calibration photo may look like that");
 }

@@ -84,6 +84,35 @@ fn nothing_to_see_is_no_panic() {
     assert!(found.score < 0.1);
 }
 
+/// Two assemblies in one photo, the second fainter: both are where an assembly may stand, the clearer one first. Of one alone there
+/// is one pose, though many of the grid lead to it.
+#[test]
+fn every_place_of_which_the_edges_speak_is_told() {
+    let (camera, search) = setup();
+    let standing = [[-12.0, 12.0], [-4.0, 4.0], [0.0, 0.0], [-0.05, 0.05]];
+    let at = |x: f64| Pose { x, y: 0.5, z: 0.0, rz: 0.01 };
+    let (left, right) = (photo(&camera, &at(-11.0)), photo(&camera, &at(11.0)));
+    let rivals = |photo: &Grid| search.rivals(&search.fields(photo, 0.005), &camera, &standing, &nobody);
+    let one = rivals(&left);
+    assert!(one.len() == 1 && (one[0].pose.x + 11.0).abs() < 0.1, "{one:?}");
+    // The one on the right lacks its lower rows.
+    let cut = right.width * 120;
+    let fainter = right.values.iter().enumerate().map(|(i, v)| if i < cut { *v } else { 0.1 });
+    let both = left.values.iter().zip(fainter).map(|(a, b)| a.max(b)).collect();
+    let two = rivals(&Grid::new(left.width, left.height, both));
+    assert!(two.len() == 2 && two[0].score > two[1].score && two[1].score > RIVAL * two[0].score, "{two:?}");
+    assert!((two[0].pose.x + 11.0).abs() < 0.1 && (two[1].pose.x - 11.0).abs() < 0.5, "{two:?}");
+}
+
+#[test]
+fn a_score_below_zero_is_still_the_best() {
+    let (camera, search) = setup();
+    let pose = |x: f64, score: f64| Located { pose: Pose { x, y: 0.0, z: 0.0, rz: 0.0 }, score };
+    let distinct = search.distinct(vec![pose(-3.0, -0.5), pose(3.0, -0.1), pose(3.1, -0.1)], &camera, RIVAL);
+    assert_eq!(distinct, [pose(3.0, -0.1)]);
+    assert_eq!(search.distinct(Vec::new(), &camera, RIVAL), []);
+}
+
 /// Half of the outline's points belong to a part that lies 1 px beside its place: with the play it has, the pose stays with
 /// the other half.
 #[test]
