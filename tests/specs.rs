@@ -205,6 +205,22 @@ fn the_spec_of_all_shapes_keeps_its_faces_within_tolerance() {
     solids_keep_their_faces(&design("shapes"));
 }
 
+/// A hole clears a little above its face; a boss put there afterwards has the height it is given, and no face of the hole's.
+#[test]
+fn a_boss_beside_a_hole_keeps_its_faces_whatever_its_height() {
+    for height in ["0.9", "1", "1.1"] {
+        let text = format!(
+            "gonogo 1\nunits mm deg\ntolerances exact\nmaterial steel {{\n    metal = steel\n}}\npart plate {{\n    material = steel\n    \
+             add slab = box(x = 60, y = 60 ±0.1, z = 12)\n    cut pocket = hole(d = 40, h = 2) at (0, 0, 12)\n    \
+             add boss = cylinder(d = 12, h = (12 + rise))\n    let rise = {height} ±0.05\n}}\nassembly a {{\n    root plate\n}}\n\
+             station s {{\n    light room = room(patches = 9)\n}}\n"
+        );
+        let loaded = load("plate.gng", &|_| Ok(text.clone()), &[]);
+        let design = loaded.design.unwrap_or_else(|| panic!("{:#?}", loaded.diagnostics));
+        solids_keep_their_faces(&design);
+    }
+}
+
 /// Every part can be made at least material, at nominal and at most material, with the same faces and more each time.
 fn solids_keep_their_faces(design: &Design) {
     for part in &design.parts {

@@ -17,8 +17,9 @@ use crate::units::Quantity;
 /// Angles of drills and countersinks lie between these (degrees): a point flatter or slimmer is a slip of the pen.
 const ANGLES: [f64; 2] = [10.0, 170.0];
 /// How far a hole clears above its face (mm), but no farther than its mouth's radius: more than the general tolerance of
-/// anything shorter than a metre, less than what stands apart on a part.
-const CLEARANCE: f64 = 1.0;
+/// anything shorter than a metre, less than what stands apart on a part. No drawing has it: where a face of the part lay level
+/// with its end, the two would part within tolerance, and a face that nobody sees would come and go.
+const CLEARANCE: f64 = 0.937;
 /// That of a countersink when nothing is said (rad).
 const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
 
