@@ -30,9 +30,12 @@ pub fn human_of(outcome: &Outcome, seen_by: &[String]) -> String {
 
 /// `pin[2]: missing (p = 0.0004, px 1 2 3 4)`
 fn found(finding: &Finding, camera: Option<&String>) -> String {
+    /// No share is told finer.
+    const FINEST: f64 = 1e-4;
     let at = finding.box_px.map(|v| format!("{v:.0}")).join(" ");
     let camera = camera.map(|camera| format!("{camera} ")).unwrap_or_default();
-    format!("{}: {} (p = {:.4}, {camera}px {at})", finding.component, finding.fault, finding.p_value)
+    let chance = if finding.p_value < FINEST { format!("< {FINEST}") } else { format!("= {:.4}", finding.p_value) };
+    format!("{}: {} (p {chance}, {camera}px {at})", finding.component, finding.fault)
 }
 
 /// The components a model answers for: those it knows a fault of beside the good state.
@@ -163,5 +166,8 @@ mod tests {
     #[test]
     fn people_read_the_component_and_the_fault() {
         assert!(human(&faulty()).contains("\n    pin[2]: missing (p = 0.0004, px 1 2 3 4)"));
+        let mut rare = faulty().verdict.findings[0].clone();
+        rare.p_value = 4.5e-5;
+        assert!(found(&rare, None).contains("(p < 0.0001, px"), "{}", found(&rare, None));
     }
 }

@@ -92,7 +92,7 @@
     const scores = $('judge-scores').content.cloneNode(true), rows = [...scores.querySelectorAll('tr')];
     if (verdict.verdict === 'cannot-inspect') about.append(make('p', {}, verdict.reason));
     const finding = ({ component, fault, p_value }) => {
-      const chance = p_value === null ? '–' : `at most ${number(100 * p_value, 1)} %`;
+      const chance = p_value === null ? '–' : `at most ${number(Math.ceil(1000 * p_value) / 10, 1)} %`;
       return make('li', {}, make('b', {}, component), `: ${fault} `, make('small', {}, `(${chance} of correct assemblies look as bad)`));
     };
     if (verdict.findings.length) about.append(make('ul', { class: 'list' }, ...verdict.findings.map(finding)));

@@ -74,8 +74,13 @@ fn finding(finding: &Finding) -> String {
         "<li><b>{}</b>: {} <small>({} of correct assemblies look as bad)</small></li>",
         escaped(&finding.component),
         escaped(&finding.fault),
-        if finding.p_value.is_finite() { format!("at most {}", percent(finding.p_value)) } else { "–".into() }
+        if finding.p_value.is_finite() { format!("at most {}", percent(up(finding.p_value))) } else { "–".into() }
     )
+}
+
+/// A share that is told as a bound is rounded up to what [`percent`] shows.
+fn up(share: f64) -> f64 {
+    (1000.0 * share).ceil() / 1000.0
 }
 
 fn figure(shot: &Shot, report: &Report) -> String {

@@ -16,7 +16,8 @@ use super::settle;
 
 /// How many coarse poses are followed, quickly, and how many of them to the end.
 const BEAM: usize = 12;
-const FINALISTS: usize = 6;
+const FINALISTS: usize = 3;
+const MOST_RIVALS: usize = 3;
 /// A pose that has this share of the best one's score is a rival of it, followed to the end or quickly, if it moves the edges by so
 /// many px of the photo. Edges can be had by a shadow, or by the grain of wood.
 const RIVAL: f64 = 0.8;
@@ -156,7 +157,7 @@ impl Search {
 
     /// The best pose within `standing` (ranges of x, y, z, rz), or `None` when there is nothing to go by.
     pub fn locate(&self, fields: &Fields, camera: &Camera, standing: &[[f64; 2]; 4]) -> Option<Located> {
-        self.rivals(fields, camera, standing, &nobody).into_iter().next()
+        self.located(fields, camera, standing, 0, &nobody).into_iter().next()
     }
 
     /// The best pose, and what others the edges speak for nearly as clearly; best first. Tells the parts of its work.
@@ -165,6 +166,18 @@ impl Search {
         fields: &Fields,
         camera: &Camera,
         standing: &[[f64; 2]; 4],
+        listener: &Listener,
+    ) -> Vec<Located> {
+        self.located(fields, camera, standing, MOST_RIVALS, listener)
+    }
+
+    /// The best pose, and of others that are worth following so many, as far as the edges speak nearly as clearly of them.
+    fn located(
+        &self,
+        fields: &Fields,
+        camera: &Camera,
+        standing: &[[f64; 2]; 4],
+        most: usize,
         listener: &Listener,
     ) -> Vec<Located> {
         listener(Part::Poses);
@@ -176,13 +189,23 @@ impl Search {
             Located { pose, score: self.score(&fields.fine, &fine.camera, &pose) }
         };
         let quick: Vec<Located> = candidates.into_iter().map(|pose| followed(pose, QUICK)).collect();
-        let quick = self.distinct(quick, camera, QUICK_RIVAL);
-        let finalists = quick.into_iter().take(FINALISTS).map(|found| followed(found.pose, FULL)).collect();
+        let followed_on = self.worth_following(quick, camera, most).into_iter();
+        let finalists = followed_on.map(|found| followed(found.pose, FULL)).collect();
         let rivals = self.distinct(finalists, camera, RIVAL);
         let finer = |pose, (factor, field): &(u32, Field)| {
             self.refine(&Level::new(field, camera, *factor), pose, standing, FULL)
         };
         rivals.iter().map(|r| Located { pose: fields.finer.iter().fold(r.pose, finer), ..*r }).collect()
+    }
+
+    /// The best of the poses that were followed quickly, and what rivals them from further off.
+    fn worth_following(&self, mut quick: Vec<Located>, camera: &Camera, most: usize) -> Vec<Located> {
+        quick.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let rivals = self.distinct(quick.clone(), camera, QUICK_RIVAL);
+        quick.truncate(FINALISTS);
+        let others: Vec<Located> = rivals.into_iter().filter(|rival| !quick.contains(rival)).collect();
+        quick.extend(others.into_iter().take(most));
+        quick
     }
 
     /// Those that score at least this share of the best, best first, without what is as good as one of them.

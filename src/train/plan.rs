@@ -40,7 +40,7 @@ const SMALLEST_ACROSS: u32 = 8;
 /// Coarsest resolution of the shots.
 const COARSEST: u32 = 4;
 /// As long as the assembly's box has no more px of the shots than this, finer ones cost little and show smaller faults.
-const AFFORDABLE: u32 = 120_000;
+const AFFORDABLE: u32 = 80_000;
 
 /// The component that everything stands on.
 const ROOT: usize = 0;
