@@ -1,9 +1,9 @@
 //! Where the assembly stands in a photo: a search over the pose on the plate, carried through the camera.
 //!
-//! In: orientation fields of the photo, edge points with 3-D positions. Out: a pose with its score. Coarse: all poses of
-//! a grid, scored by the mean agreement of edge orientations (Steger 2002; the exhaustive first level of the paper's search),
-//! polarity kept unless the model says that the light decides it. Fine: the best few follow their edges to sub-pixel
-//! accuracy by robust least squares. Never judges a component.
+//! In: orientation fields of the photo, edge points with 3-D positions. Out: a pose with its score, and those that rival it.
+//! Coarse: all poses of a grid, scored by the mean agreement of edge orientations (Steger 2002; the exhaustive first level of
+//! the paper's search), polarity kept unless the model says that the light decides it. Fine: the best few follow their edges
+//! to sub-pixel accuracy by robust least squares. Never judges a component.
 
 use super::camera::{Camera, Vec3, sub};
 use super::field::Field;
