@@ -14,6 +14,7 @@
 use crate::artifacts::Artifact;
 use crate::cache::{Folder, folder};
 use crate::diag::{Diagnostic, Sources};
+use crate::runtime::model;
 use crate::view::lock::Lock;
 use crate::{Compiled, Options};
 use std::cell::RefCell;
@@ -84,6 +85,9 @@ impl Build {
         lines.iter().for_each(|line| println!("{line}"));
         let text = compiled.model.map(|model| model.write()).or_else(|| compiled.rig.map(|rig| rig.write()));
         let Some(text) = text.filter(|_| !stopped(&compiled.diagnostics)) else { return Err(self.failed()) };
+        if let Some(why) = model::too_large(text.len()) {
+            return Err(Failed(why));
+        }
         let path = out.join(self.file());
         write(&path, &text).map_err(|e| Failed(format!("cannot write `{}`: {e}", path.display())))?;
         Ok(path)

@@ -10,7 +10,7 @@ use super::{Exit, fix, keep, rig};
 use crate::artifacts::Artifact;
 use crate::cache::folder::Counts;
 use crate::diag::Diagnostic;
-use crate::runtime::model::{Model, Promise, Rate};
+use crate::runtime::model::{self, Model, Promise, Rate};
 use crate::runtime::rig::Rig;
 use crate::{Compiled, Options};
 use std::collections::BTreeSet;
@@ -241,6 +241,9 @@ impl Outputs {
         }
         let text = compiled.model.as_ref().map(Model::write).or_else(|| compiled.rig.as_ref().map(Rig::write));
         if let Some(text) = text.filter(|_| self.wants_model) {
+            if let Some(why) = model::too_large(text.len()) {
+                return Err(Failure(why));
+            }
             output::write(&self.model, text.as_bytes())?;
             written.push(self.model.clone());
         }

@@ -85,7 +85,7 @@ impl Pen<'_> {
             self.quad(shrunk(node.outline, GAP * f64::from(ring)), ink, 1);
         }
         if node.faulty {
-            let [a, b, c, d] = node.outline;
+            let [a, b, c, d] = node.crossed;
             let width = if node.explained { 1 } else { 3 };
             self.line(a, c, ink, width);
             self.line(b, d, ink, width);
@@ -153,6 +153,7 @@ mod tests {
             level,
             parent: None,
             outline: [[10.0, 10.0], [50.0, 10.0], [50.0, 40.0], [10.0, 40.0]],
+            crossed: [[10.0, 10.0], [50.0, 10.0], [50.0, 40.0], [10.0, 40.0]],
             score: 0.0,
             against: Vec::new(),
             best_fault: "missing".into(),

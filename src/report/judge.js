@@ -45,7 +45,7 @@
     const group = make('svg:g', { class: kind }, make('svg:title', {}, report.faulty ? `${report.node}: ${report.fault}` : report.node));
     for (let ring = 0; ring <= Math.min(report.level, MOST_BOXES); ring++) group.append(quad(shrunk(report.outline, GAP * ring)));
     if (report.faulty) {
-      const [a, b, c, d] = report.outline.map((p) => p.join(' '));
+      const [a, b, c, d] = report.crossed.map((p) => p.join(' '));
       group.append(make('svg:path', { d: `M${a}L${c}M${b}L${d}` }));
     }
     if (row && row.dataset.component) {

@@ -111,7 +111,7 @@ fn node(node: &NodeReport, index: Option<usize>) -> String {
     let rings: String =
         (0..=node.level.min(MOST_BOXES)).map(|r| quad(shrunk(node.outline, GAP * f64::from(r)), "")).collect();
     let cross = if node.faulty {
-        let [a, b, c, d] = node.outline.map(|p| p.map(at).join(" "));
+        let [a, b, c, d] = node.crossed.map(|p| p.map(at).join(" "));
         format!("<path d=\"M{a}L{c}M{b}L{d}\"/>")
     } else {
         String::new()

@@ -58,6 +58,7 @@ fn verdict() -> Verdict {
         level: 900_000,
         parent: None,
         outline,
+        crossed: outline,
         score: -1.0,
         against: vec![0.0, -1.0],
         best_fault: SPITE.into(),

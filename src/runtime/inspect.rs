@@ -19,7 +19,7 @@ use super::photo::{Photo, PhotoError};
 use super::pose::Pose;
 use super::rise::{self, Lift};
 use super::settle::{self, Expected, LEAST_OTHERS};
-use super::strange::{self, Unlikeness};
+use super::strange::{self, Square, Unlikeness};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
@@ -65,6 +65,8 @@ pub struct NodeReport {
     pub parent: Option<usize>,
     /// Corners of the visible component's box as carried to the photo (px).
     pub outline: [[f64; 2]; 4],
+    /// Corners of what is crossed out if the node is faulty (px): its outline, or the square that looks like nothing the model knows.
+    pub crossed: [[f64; 2]; 4],
     /// Log-likelihood ratio per coefficient of the good state against the error mode that comes closest, less that mode's
     /// threshold: faulty below zero.
     pub score: f64,
@@ -226,7 +228,7 @@ impl<'a> Inspector<'a> {
         let mut nodes: Vec<NodeReport> =
             (0..evidence.len()).map(|i| self.report(i, &evidence[i], &found.pose)).collect();
         (self.listener)(Part::Unknown);
-        strange::weigh(&mut nodes, &self.model.nodes, &self.calibrated);
+        let odd = strange::weigh(&mut nodes, &self.model.nodes, &self.calibrated);
         (self.listener)(Part::Explain);
         let disturbed = self.disturbed(&nodes, photo, &found.pose);
         let order = self.blame(&mut nodes, &evidence, &disturbed);
@@ -235,8 +237,11 @@ impl<'a> Inspector<'a> {
         let mut findings: Vec<Finding> = order.iter().map(of_mode).collect();
         let hidden = nodes.iter().position(|n| n.inside < LEAST_INSIDE);
         if findings.is_empty() && hidden.is_none() {
-            let beside = mark_beside(&self.model, &mut nodes);
-            findings.extend(beside.map(|(i, p_value)| self.finding(i, &nodes[i], p_value)));
+            if let Some((i, p_value)) = mark_beside(&self.model, &mut nodes) {
+                findings.push(self.finding(i, &nodes[i], p_value));
+                let odd = odd[i].filter(|_| nodes[i].best_fault == strange::UNKNOWN);
+                nodes[i].crossed = odd.and_then(|s| self.square(i, s, &found.pose)).unwrap_or(nodes[i].outline);
+            }
         }
         let (decision, reason) = match (&findings[..], hidden) {
             ([], None) => (Decision::Go, String::new()),
@@ -263,11 +268,13 @@ impl<'a> Inspector<'a> {
         let node = &self.model.nodes[index];
         let against = against(evidence, self.coefficients(index));
         let (fault, score) = score(node, &rise::weighed(node, &against, evidence.lift));
+        let outline = self.carried(node.visible, node.plane, pose);
         NodeReport {
             name: node.name.clone(),
             level: node.level,
             parent: node.parent.map(|p| p as usize),
-            outline: self.carried(node.visible, node.plane, pose),
+            outline,
+            crossed: outline,
             score,
             against,
             best_fault: fault.map_or_else(String::new, |h| node.hypotheses[h].fault.clone()),
@@ -347,6 +354,15 @@ impl<'a> Inspector<'a> {
             let point = self.on_plane(corner, plane).map(|p| pose.apply(self.prepared.home.invert(p)));
             point.and_then(|p| self.camera.project(p)).unwrap_or(corner)
         })
+    }
+
+    /// Corners of a square of a node as they lie in this photo.
+    fn square(&self, node: usize, square: Square, pose: &Pose) -> Option<[[f64; 2]; 4]> {
+        let NodeImages { window, stencil, .. } = &self.prepared.nodes[node];
+        let [x0, y0, x1, y1] = stencil.square(square.scale, square.index)?;
+        let frame = window.frame;
+        let at = |i: usize, v: usize| (f64::from(frame.origin[i]) + v as f64) * f64::from(frame.factor);
+        Some(self.carried([at(0, x0), at(1, y0), at(0, x1), at(1, y1)], frame.plane, pose))
     }
 
     /// The point at this height (mm, assembly frame) that the nominal photo shows there (px), in the station's frame.

@@ -280,6 +280,7 @@ impl<'a> RigInspector<'a> {
                 level: nodes().map(|n| n.level).min().unwrap_or(1),
                 parent: None,
                 outline: [[0.0; 2]; 4],
+                crossed: [[0.0; 2]; 4],
                 score: weighed.score,
                 against: Vec::new(),
                 best_fault: of.modes.get(weighed.best).map_or_else(String::new, |m| m.fault.clone()),

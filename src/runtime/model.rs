@@ -15,8 +15,8 @@ use std::fmt;
 pub const FORMAT: u32 = 7;
 /// Sizes of squares in which a node is held against its good state: the cells of its coarsest level and of the one before.
 pub const SCALES: usize = 3;
-/// Larger files are refused before they are parsed (bytes).
-const LARGEST_FILE: usize = 128 << 20;
+/// Larger files are not written, and refused before they are parsed (bytes): ten times what an assembly of twenty components takes.
+const LARGEST_FILE: usize = 1 << 30;
 /// Caps on counts, far above any real station.
 const MOST_NODES: usize = 2_000;
 const MOST_LAMPS: usize = 256;
@@ -413,6 +413,13 @@ pub(super) fn to_ron_down_to<T: Serialize>(depth: usize, value: &T) -> String {
 /// Adds the digest line.
 pub(super) fn seal(body: &str) -> String {
     format!("{body}{DIGEST_LINE}{}\n", digest_of(body))
+}
+
+/// Why a model of this many bytes is not written, if it is too large to be read again.
+pub fn too_large(bytes: usize) -> Option<String> {
+    let (has, most) = (bytes >> 20, LARGEST_FILE >> 20);
+    let less = "`train { images }` and watch fewer components: it grows with both";
+    (bytes > LARGEST_FILE).then(|| format!("the model takes {has} MiB, and no more than {most} are read: lower {less}"))
 }
 
 /// Checks size, format and digest; the text without its digest line.

@@ -36,7 +36,7 @@ impl Outcome {
     }
 
     /// The same with what a picture of it needs: `decoded` (whether the photo is an image of the right size), the locator's
-    /// score, the corners of the assembly's box (px), and per node its score, corners, level and fault.
+    /// score, the corners of the assembly's box (px), and per node its score, corners, those of what is crossed out, level and fault.
     pub fn json_in_full(&self, decoded: bool) -> String {
         let mut text = self.json();
         text.pop();
@@ -149,6 +149,8 @@ fn node(text: &mut String, node: &NodeReport) {
     number(text, node.score, 6);
     *text += ",\"outline\":";
     corners(text, &node.outline);
+    *text += ",\"crossed\":";
+    corners(text, &node.crossed);
     *text += "}";
 }
 

@@ -2,7 +2,7 @@
 //!
 //! In: how unlike its good state each node of a photo is, square by square, what held-out renders of correct assemblies show
 //! there, and what the calibration photo showed. Out: per node by how many standard deviations its oddest square is odder than
-//! it should be, and the node that stands out. Never says what it is.
+//! it should be, and which that is, and the node that stands out. Never says what it is.
 //!
 //! A square is held against itself: a bright rim is never quite as rendered, a plain face nearly always. Logarithms are
 //! compared: unlikeness is a mean of squares' logarithms, so what a station adds to it, it adds by a factor. A model that is
@@ -17,6 +17,15 @@ use super::row::Row;
 /// Mean surprise in every square of each size: steps of its logarithm from ln 0.001, counted from 1; 0 where a square holds
 /// too few coefficients.
 pub type Unlikeness = [Row; SCALES];
+
+/// A square of a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Square {
+    /// Index into an [`Unlikeness`].
+    pub scale: usize,
+    /// Index into its row.
+    pub index: usize,
+}
 
 /// Beyond this many standard deviations of renders a node is strange: of hundreds of squares the oddest counts, and photos
 /// scatter more than renders.
@@ -146,13 +155,19 @@ fn deviation(own: &[f64], beyond: f64) -> f64 {
 /// By how much the logarithm of what a square shows exceeds what it usually shows, or what it showed at calibration, where it
 /// does so most; 0 where no square is unlike.
 fn excess(unlike: &Row, high: &Row, calibrated: Option<&Row>) -> f64 {
+    oddest(unlike, high, calibrated).map_or(0.0, |(excess, _)| excess)
+}
+
+/// That excess, where it is above 0, and the square.
+fn oddest(unlike: &Row, high: &Row, calibrated: Option<&Row>) -> Option<(f64, usize)> {
     let squares = unlike.0.iter().zip(&high.0).enumerate();
     let of = |(k, (&shown, &usual)): (usize, (&u16, &u16))| {
         let shown = log(shown).filter(|shown| *shown >= math::ln(LEAST))?;
         let before = calibrated.and_then(|row| log(*row.0.get(k)?));
-        Some(shown - before.map_or(log(usual)?, |before| before.max(log(usual).unwrap_or(before))))
+        let excess = shown - before.map_or(log(usual)?, |before| before.max(log(usual).unwrap_or(before)));
+        (excess > 0.0).then_some((excess, k))
     };
-    squares.filter_map(of).fold(0.0, f64::max)
+    squares.filter_map(of).max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// What a node showed at calibration.
@@ -187,35 +202,47 @@ fn more(
 }
 
 /// Writes every node's strangeness: standard deviations beyond what it may show. `calibrated` holds what each node showed in the
-/// calibration photos, the mean of them.
-pub fn weigh(nodes: &mut [NodeReport], of: &[Node], calibrated: &[Option<Unlikeness>]) {
+/// calibration photos, the mean of them. Returns per node the square that says so, `None` where none is odd.
+pub fn weigh(nodes: &mut [NodeReport], of: &[Node], calibrated: &[Option<Unlikeness>]) -> Vec<Option<Square>> {
     let unlike: Vec<Unlikeness> = nodes.iter().map(|n| n.unlike.clone()).collect();
     let usual: Vec<Vec<Usual>> = of.iter().map(|n| n.usual.clone()).collect();
     nodes.iter_mut().for_each(|n| n.strangeness = 0.0);
+    let mut squares = vec![None; nodes.len()];
     for scale in 0..SCALES {
         let beyond = beyond(&more(&unlike, &usual, calibrated, scale));
         for i in (0..nodes.len()).filter(|&i| usual[i].len() > scale) {
             let deviation = usual[i][scale].excess[1] * of_middle(nodes.len());
-            nodes[i].strangeness = nodes[i].strangeness.max(beyond[i] / deviation);
+            if beyond[i] / deviation > nodes[i].strangeness {
+                nodes[i].strangeness = beyond[i] / deviation;
+                let odd = oddest(&unlike[i][scale], &usual[i][scale].high, before(calibrated, i, scale));
+                squares[i] = odd.map(|(_, index)| Square { scale, index });
+            }
         }
     }
     for (i, node) in nodes.iter_mut().enumerate() {
-        node.strangeness = node.strangeness.max(LIMIT * far(&unlike, i));
+        let far = LIMIT * far(&unlike, i);
+        if far > node.strangeness {
+            node.strangeness = far;
+            squares[i] = highest(&unlike[i]).map(|(index, _)| Square { scale: 0, index });
+        }
     }
+    squares
 }
 
-/// The highest of a node's largest squares.
-fn highest(unlike: &Unlikeness) -> f64 {
-    unlike[0].0.iter().max().and_then(|code| log(*code)).map_or(0.0, math::exp)
+/// The highest of a node's largest squares, and what it shows.
+fn highest(unlike: &Unlikeness) -> Option<(usize, f64)> {
+    let (index, code) = unlike[0].0.iter().enumerate().max_by_key(|(_, code)| **code)?;
+    Some((index, math::exp(log(*code)?)))
 }
 
 /// Renders of few draws leave much room for what they have not shown; but no square of a correct assembly is far from all that
 /// was rendered, unless the whole photo is: how far it is of what decides (1 at the limit). A lone node has nothing to be
 /// held against.
 fn far(unlike: &[Unlikeness], node: usize) -> f64 {
-    let mut others: Vec<f32> = (0..unlike.len()).filter(|&k| k != node).map(|k| highest(&unlike[k]) as f32).collect();
+    let highest = |k: usize| highest(&unlike[k]).map_or(0.0, |(_, shown)| shown);
+    let mut others: Vec<f32> = (0..unlike.len()).filter(|&k| k != node).map(|k| highest(k) as f32).collect();
     let common = |others: &mut Vec<f32>| FAR + COMMON * f64::from(linear::median(others));
-    if others.is_empty() { 0.0 } else { highest(&unlike[node]) / common(&mut others) }
+    if others.is_empty() { 0.0 } else { highest(node) / common(&mut others) }
 }
 
 /// What the scatter of the other nodes' median adds to a deviation from it: its variance is π/2 of the mean's.
@@ -233,6 +260,7 @@ pub fn strangest(nodes: &[NodeReport]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::runtime::model::tests::tiny;
 
     /// A node of four squares of each size that show this many times 0.4, and the last `odd` times that.
     fn node(factor: f64, odd: f64) -> Unlikeness {
@@ -259,6 +287,38 @@ mod tests {
         let odd = strangeness(&nodes(5, 2, node(1.0, 8.0)), &nodes(5, 0, node(1.0, 1.0)));
         assert!(odd[2] > LIMIT, "{odd:?}");
         assert!(odd.iter().enumerate().all(|(i, s)| i == 2 || *s < 1.0), "{odd:?}");
+    }
+
+    #[test]
+    fn the_odd_square_is_named() {
+        let tiny = tiny().nodes.remove(0);
+        let of: Vec<Node> = usual_nodes(5).into_iter().map(|usual| Node { usual, ..tiny.clone() }).collect();
+        let report = |unlike: Unlikeness| NodeReport {
+            name: "pin".into(),
+            level: 1,
+            parent: None,
+            outline: [[0.0; 2]; 4],
+            crossed: [[0.0; 2]; 4],
+            score: 0.1,
+            against: Vec::new(),
+            best_fault: String::new(),
+            inside: 1.0,
+            unlike,
+            strangeness: 0.0,
+            lift: None,
+            beyond: 0.0,
+            faulty: false,
+            explained: false,
+        };
+        let squares = |odd: f64| {
+            let mut nodes: Vec<NodeReport> = nodes(5, 2, node(1.0, odd)).into_iter().map(report).collect();
+            (weigh(&mut nodes, &of, &[])[2], strangest(&nodes))
+        };
+        // The last of four, in the size of squares that was looked at first, of all that say the same.
+        let named = Some(Square { scale: 0, index: 3 });
+        assert_eq!(squares(8.0), (named, Some(2)));
+        assert_eq!(squares(400.0), (named, Some(2)), "far from all renders");
+        assert_eq!(squares(1.0).1, None);
     }
 
     #[test]

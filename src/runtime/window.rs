@@ -219,6 +219,13 @@ impl Stencil {
         })
     }
 
+    /// Sides of a square of [`Stencil::square_means`] (node px): x0, y0, x1, y1.
+    pub fn square(&self, scale: usize, index: usize) -> Option<[usize; 4]> {
+        let level = self.levels.iter().rev().nth(scale)?;
+        let of = self.cells[level.start / 2..level.end / 2].get(index)?;
+        Some([of.x - of.half, of.y - of.half, of.x + of.half, of.y + of.half])
+    }
+
     /// Per square of [`Stencil::square_means`] the highest mean of it and of those that overlap it.
     pub fn widened<const SCALES: usize>(&self, means: &[Vec<f64>; SCALES]) -> [Vec<f64>; SCALES] {
         let mut levels = self.levels.iter().rev();
@@ -287,6 +294,10 @@ mod tests {
         let means: [Vec<f64>; 2] = stencil.square_means(&values);
         let wide = stencil.widened(&means);
         let count = |all: &Vec<f64>| all.iter().filter(|v| **v > 0.0).count();
+        assert!(stencil.square(1, 0).is_some_and(|[x0, y0, x1, y1]| x1 - x0 == 8 && y1 - y0 == 8));
+        let [x0, y0, x1, y1] = stencil.square(0, means[0].iter().position(|v| *v > 0.0).unwrap()).unwrap();
+        assert!(x0 <= 20 && 20 <= x1 && y0 <= 20 && 20 <= y1 && x1 - x0 == 16 && y1 - y0 == 16);
+        assert_eq!((stencil.square(0, 10_000), stencil.square(9, 0)), (None, None));
         for scale in 0..2 {
             assert!(count(&means[scale]) > 0 && count(&wide[scale]) > count(&means[scale]), "{scale}");
             assert!(wide[scale].iter().zip(&means[scale]).all(|(w, m)| w >= m));

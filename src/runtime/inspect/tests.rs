@@ -12,6 +12,7 @@ fn what_looks_right_beside_its_place_is_misplaced() {
         level: 1,
         parent: None,
         outline: [[0.0; 2]; 4],
+        crossed: [[0.0; 2]; 4],
         score: 0.1,
         against: vec![0.0, 0.1],
         best_fault: "missing".into(),

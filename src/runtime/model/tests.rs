@@ -110,3 +110,10 @@ fn numbers_that_do_not_fit_together_are_refused() {
         assert!(Model::read(&model.write()).is_err(), "spoil {i}");
     }
 }
+
+#[test]
+fn what_is_too_large_to_be_read_is_not_written() {
+    assert_eq!(too_large(LARGEST_FILE), None);
+    let why = too_large(LARGEST_FILE + 1).unwrap();
+    assert!(why.contains("1024 MiB") && why.contains("train { images }"), "{why}");
+}

@@ -49,6 +49,7 @@ fn in_full_the_line_goes_on_with_boxes_and_scores() {
         level: 1,
         parent: None,
         outline: [[0.0; 2]; 4],
+        crossed: [[1.0, 0.0]; 4],
         score: -0.1234567,
         against: Vec::new(),
         best_fault: "missing".into(),
@@ -68,6 +69,7 @@ fn in_full_the_line_goes_on_with_boxes_and_scores() {
     let node = serde_json::json!({
         "node": "pin[2] \"x\"", "level": 1, "faulty": true, "explained": false, "fault": "missing", "score": -0.123457,
         "outline": [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]],
+        "crossed": [[1.0, 0.0], [1.0, 0.0], [1.0, 0.0], [1.0, 0.0]],
     });
     assert_eq!(read["nodes"], serde_json::json!([node]));
     let unread = Outcome::unreadable("x".into(), "no".into()).json_in_full(false);
