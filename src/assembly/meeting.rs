@@ -20,6 +20,8 @@ const DEPTH_TOLERANCE: f64 = 0.02;
 /// Cells across the region two bodies share, and the least side of a cell (mm).
 const CELLS_ACROSS: f64 = 64.0;
 const FINEST_CELL: f64 = 0.05;
+/// Cells across the places where two bodies enter each other, to measure how far.
+const FINE_CELLS_ACROSS: f64 = 256.0;
 /// What two triangles share may be the sagging of facets up to this width (mm).
 const SAG: f64 = 0.04;
 /// Places that differ by less than this (mm) are one.
@@ -151,7 +153,7 @@ fn meeting(bodies: [&Shade; 2]) -> Option<Meeting> {
     Some(Meeting {
         second_above: is_above(0, &p, &q, higher(&first, &second)),
         first_above: is_above(1, &q, &p, higher(&second, &first)),
-        depth: if region.high[2] - region.low[2] > DEPTH_TOLERANCE { depth(&p, &q, &grid) } else { None },
+        depth: if region.high[2] - region.low[2] > DEPTH_TOLERANCE { entered(bodies, &p, &q, &grid) } else { None },
     })
 }
 
@@ -200,6 +202,30 @@ fn any_wide(grid: &Grid, test: impl Fn(usize) -> bool) -> bool {
     marked.iter().any(|m| *m) && erode(&marked, grid).contains(&true)
 }
 
+/// How far two bodies enter each other (mm), from a closer look at where columns of a coarse grid do: the flanks of two teeth may be
+/// in each other over a few tenths of a mm of bodies that share a hundred.
+fn entered(bodies: [&Shade; 2], p: &Columns, q: &Columns, coarse: &Grid) -> Option<f64> {
+    let marked: Vec<[f64; 3]> = (0..coarse.cells())
+        .filter(|c| shared_length(p.spans(*c), q.spans(*c)) > DEPTH_TOLERANCE)
+        .map(|c| [coarse.centre(c)[0], coarse.centre(c)[1], 0.0])
+        .collect();
+    if marked.is_empty() {
+        return None;
+    }
+    let mut region = Extent::of(&marked);
+    for axis in 0..2 {
+        (region.low[axis], region.high[axis]) = (region.low[axis] - coarse.cell, region.high[axis] + coarse.cell);
+    }
+    let across = (region.high[0] - region.low[0]).max(region.high[1] - region.low[1]);
+    let cell = (across / FINE_CELLS_ACROSS).max(FINEST_CELL);
+    if cell >= coarse.cell {
+        return depth(p, q, coarse);
+    }
+    let grid = Grid::over(&region, cell);
+    let [p, q] = bodies.map(|b| Columns::of(b.over(&region), &grid));
+    depth(&p, &q, &grid)
+}
+
 /// How far two bodies enter each other (mm): the shorter of the way out along the direction and across it.
 fn depth(p: &Columns, q: &Columns, grid: &Grid) -> Option<f64> {
     let shared: Vec<f64> = (0..grid.cells()).map(|c| shared_length(p.spans(c), q.spans(c))).collect();
@@ -236,6 +262,19 @@ mod tests {
         let meetings = Meetings::new(Vector3::z_axis(), &a.solids, &place(&a.design, &a.design.nominal()));
         assert_eq!(meetings.entering.len(), 1);
         assert!((meetings.entering[0].depth - 0.3).abs() < 1e-9, "{:?}", meetings.entering);
+    }
+
+    /// Side by side, 0.3 mm of each in the other over their whole length of 20 mm.
+    #[test]
+    fn what_is_narrow_and_long_is_measured_too() {
+        let mut shop = sample::Shop::default();
+        let plate = shop.plate("plate", [2.0, 0.0], [20.0, 0.0], &[]);
+        shop.place("left", plate, [0.0; 3], 0.0, 0.0);
+        shop.place("right", plate, [19.7, 0.0, 0.0], 0.0, 0.0);
+        let a = shop.finish();
+        let meetings = Meetings::new(Vector3::z_axis(), &a.solids, &place(&a.design, &a.design.nominal()));
+        assert_eq!(meetings.entering.len(), 1);
+        assert!((meetings.entering[0].depth - 0.3).abs() < 0.1, "{:?}", meetings.entering);
     }
 
     #[test]
