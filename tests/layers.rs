@@ -70,7 +70,7 @@ const HOUSE: &[(&str, &[&str])] = &[
             "units",
         ],
     ),
-    ("build", &["artifacts", "view", "cache", "diag"]),
+    ("build", &["artifacts", "view", "runtime", "cache", "diag"]),
 ];
 
 /// An outside crate and the files that may use it.
