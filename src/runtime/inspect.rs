@@ -236,12 +236,11 @@ impl<'a> Inspector<'a> {
         let of_mode = |&i: &usize| self.finding(i, &nodes[i], p_value(&self.model.nodes[i], nodes[i].score));
         let mut findings: Vec<Finding> = order.iter().map(of_mode).collect();
         let hidden = nodes.iter().position(|n| n.inside < LEAST_INSIDE);
-        if findings.is_empty() && hidden.is_none() {
-            if let Some((i, p_value)) = mark_beside(&self.model, &mut nodes) {
-                findings.push(self.finding(i, &nodes[i], p_value));
-                let odd = odd[i].filter(|_| nodes[i].best_fault == strange::UNKNOWN);
-                nodes[i].crossed = odd.and_then(|s| self.square(i, s, &found.pose)).unwrap_or(nodes[i].outline);
-            }
+        let asked = findings.is_empty() && hidden.is_none();
+        if let Some((i, p_value)) = asked.then(|| mark_beside(&self.model, &mut nodes)).flatten() {
+            findings.push(self.finding(i, &nodes[i], p_value));
+            let odd = odd[i].filter(|_| nodes[i].best_fault == strange::UNKNOWN);
+            nodes[i].crossed = odd.and_then(|s| self.square(i, s, &found.pose)).unwrap_or(nodes[i].outline);
         }
         let (decision, reason) = match (&findings[..], hidden) {
             ([], None) => (Decision::Go, String::new()),
