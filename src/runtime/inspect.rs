@@ -491,4 +491,4 @@ fn not_found(found: Option<Located>, least: f64) -> Verdict {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -260,6 +260,7 @@ pub fn strangest(nodes: &[NodeReport]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::runtime::inspect::tests::correct;
     use crate::runtime::model::tests::tiny;
 
     /// A node of four squares of each size that show this many times 0.4, and the last `odd` times that.
@@ -293,23 +294,7 @@ mod tests {
     fn the_odd_square_is_named() {
         let tiny = tiny().nodes.remove(0);
         let of: Vec<Node> = usual_nodes(5).into_iter().map(|usual| Node { usual, ..tiny.clone() }).collect();
-        let report = |unlike: Unlikeness| NodeReport {
-            name: "pin".into(),
-            level: 1,
-            parent: None,
-            outline: [[0.0; 2]; 4],
-            crossed: [[0.0; 2]; 4],
-            score: 0.1,
-            against: Vec::new(),
-            best_fault: String::new(),
-            inside: 1.0,
-            unlike,
-            strangeness: 0.0,
-            lift: None,
-            beyond: 0.0,
-            faulty: false,
-            explained: false,
-        };
+        let report = |unlike: Unlikeness| NodeReport { unlike, ..correct() };
         let squares = |odd: f64| {
             let mut nodes: Vec<NodeReport> = nodes(5, 2, node(1.0, odd)).into_iter().map(report).collect();
             (weigh(&mut nodes, &of, &[])[2], strangest(&nodes))

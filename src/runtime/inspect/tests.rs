@@ -1,13 +1,9 @@
 use super::*;
 use crate::runtime::model::tests::tiny;
 
-/// One of a hundred good photos may be rejected: for each of four nodes the square root of the ratio must be four hundred,
-/// 2 ln 400 = 12 in a hundred independent coefficients.
-#[test]
-fn what_looks_right_beside_its_place_is_misplaced() {
-    let mut model = tiny();
-    model.nodes = vec![model.nodes[0].clone(); 4];
-    let report = |beyond: f64| NodeReport {
+/// A node in which nothing is wrong.
+pub(crate) fn correct() -> NodeReport {
+    NodeReport {
         name: "pin".into(),
         level: 1,
         parent: None,
@@ -18,12 +14,21 @@ fn what_looks_right_beside_its_place_is_misplaced() {
         best_fault: "missing".into(),
         inside: 1.0,
         unlike: Unlikeness::default(),
-        strangeness: 1.0,
+        strangeness: 0.0,
         lift: None,
-        beyond,
+        beyond: 0.0,
         faulty: false,
         explained: false,
-    };
+    }
+}
+
+/// One of a hundred good photos may be rejected: for each of four nodes the square root of the ratio must be four hundred,
+/// 2 ln 400 = 12 in a hundred independent coefficients.
+#[test]
+fn what_looks_right_beside_its_place_is_misplaced() {
+    let mut model = tiny();
+    model.nodes = vec![model.nodes[0].clone(); 4];
+    let report = |beyond: f64| NodeReport { strangeness: 1.0, beyond, ..correct() };
     let found = |model: &Model, beyond: [f64; 4]| beside(model, &beyond.map(report));
     assert_eq!(found(&model, [0.0, 0.121, 0.0, 0.0]), Some((1, MISPLACED)));
     assert_eq!(found(&model, [0.0, 0.119, 0.0, 0.0]), None);
